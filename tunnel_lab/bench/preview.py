@@ -16,6 +16,7 @@ from tunnel_lab.bench.fields import Changed, field_of
 from tunnel_lab.bench.parts import asked_in, label_of, name_of, show_command, text_of
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.files.importing.choices import ImportChoices, read_recipe
+from tunnel_sim.files.importing.remarks import ImportRemark
 from tunnel_sim.files.toml_input import validate
 from tunnel_sim.files.writing import write_whole
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -253,7 +254,7 @@ def drawn(imported: Imported, order: Sequence[str] = ()) -> list[DrawnRecord]:
         id(part.raw): (part.raw, [each for each in imported.parts if each.raw is part.raw])
         for part in imported.parts
     }
-    doubts = {part.id: doubts_of(part, imported) for part in imported.parts}
+    doubts = {part.id: doubts_of(part) for part in imported.parts}
     places = {key: place for place, key in enumerate(order)}
 
     def place(found: tuple[RawRecord, list[ImportedRun]]) -> int:
@@ -275,35 +276,11 @@ def drawn(imported: Imported, order: Sequence[str] = ()) -> list[DrawnRecord]:
     return records
 
 
-def doubts_of(part: ImportedRun, imported: Imported) -> tuple[str, ...]:
-    """What the user has to judge in a run, in one line each; empty where it looks like a free decay."""
-    from tunnel_sim.files.importing.cleaning import clipped
-    from tunnel_sim.files.plausible import few_samples
-
+def doubts_of(part: ImportedRun) -> tuple[str, ...]:
+    """What the user has to judge in the motion of a run, in one line each, as the import states it."""
     if part.run is None:
         return () if part.said[-1] == LEFT_OUT else (part.said[-1],)
-    if part.run.drive is not None:
-        return ()
-    time, unit = (
-        part.raw.cleaned.file_time_s[part.piece.first : part.piece.last],
-        imported.campaign.sensor.unit,
-    )
-    found = []
-    if part.piece.held > 0.0:
-        found.append(f"a hand holds the body for {part.piece.held:.2g} s after its peak; check the release")
-    followed = any(other.raw is part.raw and other.piece.first >= part.piece.last for other in imported.parts)
-    if part.piece.stopped and not followed:
-        found.append(f"something stops the body at {time[-1]:.2f} s; check the end")
-    if part.piece.again:
-        again = part.raw.cleaned.file_time_s[part.piece.again]
-        found.append(f"the body is released again at {again:.2f} s; move the end before it")
-    if cut := clipped(part.reading):
-        levels = " and ".join(f"{level:.3g}" for level, _ in cut)
-        last = max(float(time[samples[-1]]) for _, samples in cut)
-        found.append(f"peaks are cut off at {levels} {unit}; move the release behind {last:.2f} s")
-    if few := few_samples(part.run.record):
-        found.append(few)
-    return tuple(found)
+    return tuple(remark.motion for remark in part.said if isinstance(remark, ImportRemark) and remark.motion)
 
 
 def points(time: Array, reading: Array) -> tuple[list[float], list[float | None]]:

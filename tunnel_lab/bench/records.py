@@ -265,7 +265,7 @@ class RecordsPage:
 
     def _draw(self, imported: Imported) -> None:
         """Draw the records, or only their marks where the records are already drawn."""
-        doubtful = [part.id for part in imported.parts if preview.doubts_of(part, imported)]
+        doubtful = [part.id for part in imported.parts if preview.doubts_of(part)]
         more = f" and {len(doubtful) - _MOST_NAMES} more" if len(doubtful) > _MOST_NAMES else ""
         self._judged.set_text(f"To judge, below: {', '.join(doubtful[:_MOST_NAMES])}{more}")
         self._judged.set_visibility(bool(doubtful))

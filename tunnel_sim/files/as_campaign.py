@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import shlex
 from collections import Counter
 from pathlib import Path
@@ -37,9 +36,6 @@ def as_campaign(given: Campaign | Path | str) -> Campaign:
 
 _TEXT = (".txt", ".tsv", ".dat", ".lvm", ".asc", ".gz")
 """Endings of files of text without a reader of their own."""
-_OPTION = re.compile(
-    r"""(?:give |^)(--[\w-]+ (?:"[^"]*"|(?!and\b|or\b)[^\s,;]+))|(--(?:set|name) (?:"[^"]*"|\S+)) uses it"""
-)
 
 
 def refuse_records(path: Path) -> None:
@@ -63,8 +59,7 @@ def refuse_records(path: Path) -> None:
     try:
         read_records([one for one in found if one.suffix == ending], name=name)
     except TunnelError as error:
-        given = (first or second for first, second in _OPTION.findall(str(error)))
-        options, asked = "".join(f" {one}" for one in dict.fromkeys(given)), f"; it asks: {error}"
+        options, asked = "".join(f" {one}" for one in error.options), f"; it asks: {error}"
     out = shlex.quote(f"{name}-campaign")
     command = f"tunnel import {shlex.quote(str(path))}/*{ending} --out {out}{options}"
     what = f"is a folder of {counted(count, 'record')} ({ending}), not a campaign"

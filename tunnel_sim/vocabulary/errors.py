@@ -26,15 +26,17 @@ class TunnelError(Exception):
         what: the fault, as a short clause.
         where: the file, run or option concerned; empty when there is none.
         remedy: how to correct it.
+        options: of ``tunnel import`` that correct it, each with its value, as in a command line.
 
     The text reads ``where: what; remedy`` and is always a single line. The command line prints it and exits with
     status 2.
     """
 
-    def __init__(self, what: str, *, where: str = "", remedy: str = "") -> None:
+    def __init__(self, what: str, *, where: str = "", remedy: str = "", options: Iterable[str] = ()) -> None:
         self.what = one_line(what, _LONGEST)
         self.where = one_line(where, _LONGEST)
         self.remedy = one_line(remedy, _LONGEST)
+        self.options = tuple(options)
         text = f"{self.where}: {self.what}" if self.where else self.what
         super().__init__(f"{text}; {self.remedy}" if self.remedy else text)
 
@@ -55,7 +57,12 @@ def joined(faults: Sequence[TunnelError]) -> TunnelError:
     what, remedy = (
         "; ".join(texts) for texts in zip(*((one.what, one.remedy) for one in faults), strict=True)
     )
-    return TunnelError(what, where=faults[0].where, remedy=remedy)
+    return TunnelError(what, where=faults[0].where, remedy=remedy, options=_options(faults))
+
+
+def _options(faults: Iterable[TunnelError]) -> Iterator[str]:
+    """The options of several refusals, each once."""
+    return iter(dict.fromkeys(option for fault in faults for option in fault.options))
 
 
 def together(faults: Sequence[TunnelError]) -> TunnelError:
@@ -68,10 +75,13 @@ def together(faults: Sequence[TunnelError]) -> TunnelError:
     found = []
     for (what, remedy), names in places.items():
         more = f" and {len(names) - _PLACES} more" if len(names) > _PLACES else ""
-        found.append(TunnelError(what, where=", ".join([*names][:_PLACES]) + more, remedy=remedy))
+        found.append((what, ", ".join([*names][:_PLACES]) + more, remedy))
+    options = _options(faults)
     if len(found) == 1:
-        return found[0]
-    return TunnelError(". ".join(str(one) for one in found))
+        ((what, where, remedy),) = found
+        return TunnelError(what, where=where, remedy=remedy, options=options)
+    said = (str(TunnelError(what, where=where, remedy=remedy)) for what, where, remedy in found)
+    return TunnelError(". ".join(said), options=options)
 
 
 def one_line(value: object, limit: int = 120) -> str:

@@ -131,7 +131,9 @@ def in_seconds(
     if times is None:
         interval, origin = sample_interval(facts, choices)
         if interval is None:
-            raise TunnelError("no column of times", where=where, remedy="give --time NAME, or --rate in Hz")
+            option = "--time NAME"
+            remedy = f"give {option}, or --rate in Hz"
+            raise TunnelError("no column of times", where=where, remedy=remedy, options=(option,))
         said.append(f"times at {1.0 / interval:.6g} Hz: {origin}")
         return np.arange(count, dtype=np.float64) * interval
     values = without_overflow(times.values, said)
@@ -169,7 +171,7 @@ def refuse_without_unit(channels: Sequence[Channel], where: str) -> None:
     if not found:
         return
     noun = f"is {'an' if first == 'acceleration' else 'a'} {first} by its name, and nothing states its unit"
-    chosen = f'--angle "{one_line(found[0].name, 40)}"'
+    chosen = option = f'--angle "{one_line(found[0].name, 40)}"'
     if len(found) > 1:
         noun = f"are {first}s by their names, and nothing states their unit"
         chosen += ", or another of them,"
@@ -177,6 +179,7 @@ def refuse_without_unit(channels: Sequence[Channel], where: str) -> None:
         f"{listed(found)} {noun}",
         where=where,
         remedy=f"give {chosen} and --unit, one of {', '.join(UNITS[first])}; or --unit deg if it is an angle",
+        options=(option,),
     )
 
 
@@ -216,15 +219,17 @@ def in_radians(
         said.append(f"'{reading.name}' holds counts, {choices.counts_per_turn:g} per turn")
     if kind_of(unit) in ("counts", "voltage"):
         option = "--counts-per-turn N" if kind_of(unit) == "counts" else '--calibration "a + b*V"'
-        raise TunnelError(f"'{reading.name}' is in {unit}", where=where, remedy=f"give {option}")
+        what = f"'{reading.name}' is in {unit}"
+        raise TunnelError(what, where=where, remedy=f"give {option}", options=(option,))
     if not unit:
         if calibration is None:
             _ask_for_unit(reading, kinds, "--unit", where)
             refuse_without_unit([reading], where)
             if names_voltage(reading.name):
                 what = f"'{one_line(reading.name, 40)}' may be a voltage by its name, and nothing states its unit"
-                remedy = 'give --calibration "a + b*V", or --unit if it is an angle'
-                raise TunnelError(what, where=where, remedy=remedy)
+                option = '--calibration "a + b*V"'
+                remedy = f"give {option}, or --unit if it is an angle"
+                raise TunnelError(what, where=where, remedy=remedy, options=(option,))
         unit, swing = guessed_angle_unit(values)
         no_unit, change = f"the file states no unit of '{reading.name}'", "--unit changes this"
         said.append(
@@ -241,8 +246,9 @@ def in_radians(
     # A disc between springs swings as far, but counts look like degrees.
     if unit == "deg" and choices.unit is None and calibration is None and swing > _HALF_TURN:
         what = f"'{one_line(reading.name, 40)}' would swing by more than half a turn in degrees"
-        remedy = "give --counts-per-turn N for an encoder, or --unit deg if it does"
-        raise TunnelError(what, where=where, remedy=remedy)
+        option = "--counts-per-turn N"
+        remedy = f"give {option} for an encoder, or --unit deg if it does"
+        raise TunnelError(what, where=where, remedy=remedy, options=(option,))
     return values, quantity, unit
 
 

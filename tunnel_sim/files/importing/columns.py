@@ -59,7 +59,7 @@ class Unread(TunnelError):
     """Columns of times and readings whose units or rate are to be stated."""
 
     def __init__(self, fault: TunnelError, columns: tuple[Channel | None, Channel]) -> None:
-        super().__init__(fault.what, where=fault.where, remedy=fault.remedy)
+        super().__init__(fault.what, where=fault.where, remedy=fault.remedy, options=fault.options)
         self.columns = columns
 
 
@@ -200,8 +200,9 @@ def _apart(
         stated = choices.input is not None and matches(column, choices.input)
         if stated or (choices.input is None and driven is None and names_input(column)):
             what = f"'{one_line(name, 40)}' cannot be aligned with '{one_line(reading.name, 40)}': {why}"
-            remedy = "record both on one clock, or give --input none if it is a free decay"
-            raise TunnelError(what, where=where, remedy=remedy)
+            option = "--input none"
+            remedy = f"record both on one clock, or give {option} if it is a free decay"
+            raise TunnelError(what, where=where, remedy=remedy, options=(option,))
         remarks.append(f"'{one_line(name, 40)}' is left out: {why}")
     return remarks
 
@@ -274,7 +275,8 @@ def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[ColumnP
 def _refuse_without_angle(channels: Sequence[Channel], where: str) -> NoReturn:
     refuse_without_unit(channels, where)
     what = f"no column of angles (columns found: {listed(channels)})"
-    raise TunnelError(what, where=where, remedy="give --angle NAME and its --unit")
+    option = "--angle NAME"
+    raise TunnelError(what, where=where, remedy=f"give {option} and its --unit", options=(option,))
 
 
 def _chosen(block: Sequence[Channel], wanted: str, option: str, where: str) -> list[Channel]:
@@ -315,7 +317,8 @@ def _readings(
     of_runs = len({stem(c.name) for c in found}) == 1 and all(RUN_MARK.search(c.name) for c in found)
     if len(found) > 1 and not of_runs:
         what = f"{len(found)} columns may be the angle: {listed(found)}"
-        raise TunnelError(what, where=where, remedy=f'give --angle "{found[0].name}", or another of them')
+        option = f'--angle "{found[0].name}"'
+        raise TunnelError(what, where=where, remedy=f"give {option}, or another of them", options=(option,))
     said += [f"angle from '{stem(channel.name)}'" for channel in found if len(others) > 1]
     return found
 

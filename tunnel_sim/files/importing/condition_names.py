@@ -155,6 +155,7 @@ class Hint:
         what: its description in the file or its name, for a message.
         why: the reason for not using it.
         use: the option that uses or states it.
+        option: that option with its value; empty where the value or a file is for the user to add.
         brief: the hint without its number, the same for every run; empty: the words without it.
         symbol: whether only a column's letter suggests it, which in a robot's log is a command or a velocity.
     """
@@ -166,6 +167,7 @@ class Hint:
     use: str
     symbol: bool = False
     brief: str = ""
+    option: str = ""
 
     @property
     def words(self) -> str:

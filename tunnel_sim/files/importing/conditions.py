@@ -147,8 +147,9 @@ def _hint_of_text(name: str, text: str) -> Hint | None:
     if speed is not None:
         unit = known_unit(speed[2]) or ""
         value = float(speed[1].replace(",", ".")) * (in_si("wind_speed", unit) or 1.0)
-        use = f"--set wind_speed={value:g} uses it"
-        return Hint("wind_speed", value, shown_text, "it is a text that mentions a speed", use)
+        option = f"--set wind_speed={value:g}"
+        why = "it is a text that mentions a speed"
+        return Hint("wind_speed", value, shown_text, why, f"{option} uses it", option=option)
     if WIND_ON.search(text):
         use = "--set wind_speed=SPEED (m/s) states it"
         return Hint("wind_speed", float("nan"), shown_text, "it is a text that mentions a wind", use)
@@ -179,7 +180,8 @@ def from_facts(
                 conditions[key], names[key] = float(value) * factor, name
         elif sure:
             what = f"'{one_line(heading, 60)}' is not in a unit of {key} ({units_of(key or '')})"
-            raise TunnelError(what, where=where, remedy=f"give --set {key}=NUMBER")
+            option = f"--set {key}=NUMBER"
+            raise TunnelError(what, where=where, remedy=f"give {option}", options=(option,))
         elif hint := _hint(name, unit, key, float(value)):
             hints.append(hint)
     symbols = [hint for hint in hints if hint.key == "wind_speed" and np.isfinite(hint.value)]
@@ -212,7 +214,8 @@ def _hint(name: str, unit: str, key: str | None, value: float) -> Hint | None:
     key = resembles(name, unit)
     if key is None:
         return None
-    use = f'--set {key}="{shown_name}" uses it' if " " in shown_name else f"--set {key}={shown_name} uses it"
+    option = f'--set {key}="{shown_name}"' if " " in shown_name else f"--set {key}={shown_name}"
+    use = f"{option} uses it"
     if key == "wind_speed" and not unit and np.isnan(value) and len(name.strip()) == 1:
         use = f"{use}, --input {shown_name} if it drives the body"
         return Hint(
@@ -222,13 +225,14 @@ def _hint(name: str, unit: str, key: str | None, value: float) -> Hint | None:
             "it may be wind_speed or an input, but has no unit",
             use,
             symbol=True,
+            option=option,
         )
     if unit:
         value = value * (in_si(key, unit) or 1.0)
-        return Hint(
-            key, value, f"'{shown_name}'{number} in {unit}", "its name is not that of a condition", use
-        )
-    return Hint(key, value, f"'{shown_name}'{number}", f"it may be {key}, but has no unit", use)
+        what, why = f"'{shown_name}'{number} in {unit}", "its name is not that of a condition"
+    else:
+        what, why = f"'{shown_name}'{number}", f"it may be {key}, but has no unit"
+    return Hint(key, value, what, why, use, option=option)
 
 
 def from_column(key: str, column: Channel, rows: NDArray[np.bool_], said: list[str]) -> float | None:
@@ -312,7 +316,9 @@ def check_density(conditions: Mapping[str, float], sizes: Mapping[str, float], w
     wind = conditions.get("wind_speed", 0.0)
     if needs_density(wind, *scales) and "air_density" not in conditions:
         what = f"wind-on ({wind:g} m/s) without air_density"
-        raise Unstated(what, where=where, remedy="give --set air_density=1.2 (kg/m3, about 1.2 for air)")
+        option = "--set air_density=1.2"
+        remedy = f"give {option} (kg/m3, about 1.2 for air)"
+        raise Unstated(what, where=where, remedy=remedy, options=(option,))
 
 
 def check_wind(
@@ -336,10 +342,12 @@ def check_wind(
         if hint.key == "wind_speed" and hint.value != 0.0 and not letter:
             left_out = hint.brief.rpartition(";")[0] or f"{hint.what} is left out: {hint.why}"
             what = f"{left_out}; wind-off is not assumed beside it"
-            raise Unstated(what, where=where, remedy=f"{hint.use}, {wind_off}")
+            options = filter(None, (hint.option,))
+            raise Unstated(what, where=where, remedy=f"{hint.use}, {wind_off}", options=options)
     if WIND_ON.search(f"{stem_of(file)} {run}"):
         what = "the name states that the wind is on, but not its speed"
-        remedy = "give --set wind_speed=SPEED (m/s), --conditions or --name"
-        raise Unstated(what, where=where, remedy=remedy)
+        option = "--set wind_speed=SPEED"
+        remedy = f"give {option} (m/s), --conditions or --name"
+        raise Unstated(what, where=where, remedy=remedy, options=(option,))
     if not driven:
         said.append(doubt("wind_speed is not stated: wind-off is assumed; --set wind_speed=SPEED states it"))

@@ -145,13 +145,15 @@ def name_hints(files: Sequence[Path]) -> dict[Path, list[Hint]]:
             what = f"'{stem_of(path)[part.start : part.end]}' in the file's name"
             why = f"it may state {part.key} = {part.value:g}"
             use = "--conditions RUNS.csv states it run by run"
-            place = part.text
+            option, place = "", part.text
             if pattern and place in pattern:
-                use = f'--name "{pattern}" uses it'
+                option = f'--name "{pattern}"'
             elif len(files) == 1:
-                use = f"--set {part.key}={part.value:g} uses it"
+                option = f"--set {part.key}={part.value:g}"
+            use = f"{option} uses it" if option else use
             brief = f"a number in the files' names is left out: it may state {part.key}; {use}"
-            hints.append(Hint(part.key, part.value, what, why, use, brief=brief if len(files) > 1 else ""))
+            brief = brief if len(files) > 1 else ""
+            hints.append(Hint(part.key, part.value, what, why, use, brief=brief, option=option))
         found[path] = hints
     return found
 

@@ -13,7 +13,7 @@ from tunnel_sim.files.importing.condition_table import ConditionTable
 from tunnel_sim.files.importing.conditions import Unstated, check_density, check_wind, conditions_of
 from tunnel_sim.files.importing.raw_records import RawRecord
 from tunnel_sim.files.importing.releases import RecordPiece, stated_piece
-from tunnel_sim.files.importing.remarks import ImportRemark, doubt
+from tunnel_sim.files.importing.remarks import ImportRemark, doubt, doubt_of_motion
 from tunnel_sim.files.plausible import KEEP, checked_record, few_samples
 from tunnel_sim.files.reading import stem_of
 from tunnel_sim.files.toml_input import one_line, shown
@@ -119,7 +119,7 @@ def imported_run(
     except TunnelError as error:
         return ImportedRun(name, raw, piece, None, (*remarks, doubt(_left_out(error))), rest, sizes)
     if drive is None and stride <= 1 and (few := few_samples(record)):
-        remarks.append(doubt(few))
+        remarks.append(doubt_of_motion(few))
     begun = float(clock[0] - record.time_s[0])
     run = Run(name, record, **({"wind_speed": 0.0} | stated), drive=drive, clock_s=begun)
     return ImportedRun(name, raw, piece, run, tuple(remarks), rest, sizes, held, windy)
@@ -135,31 +135,27 @@ def _on_the_cut(
         free = (
             f"from where on the motion is free: the {piece.held:.3g} s before it are not part of a free decay"
         )
-        remarks.append(doubt(f"begins at {first} s, {free}; --start {name}=SECONDS changes it"))
+        remarks.append(doubt_of_motion(f"begins at {first} s, {free}", f"--start {name}=SECONDS changes it"))
     elif piece.first:
         rate = raw.quantity == "rate"
         at = "at the largest rate after the release" if rate else "where the body is released"
         remarks.append(ImportRemark(f"begins at {first} s, {at}", f"begins {at}"))
     if piece.last < raw.cleaned.time_s.size and piece.stopped:
-        remarks.append(
-            doubt(f"ends at {last} s, where something stops the body; --end {name}=SECONDS changes it")
-        )
+        fact = f"ends at {last} s, where something stops the body"
+        remarks.append(doubt_of_motion(fact, f"--end {name}=SECONDS changes it"))
     elif piece.last < raw.cleaned.time_s.size:
         why = "with the motion or before the next run"
         remarks.append(ImportRemark(f"ends at {last} s, {why}", f"ends {why}"))
     if piece.again:
         again = clock_text(float(raw.cleaned.file_time_s[piece.again]))
-        remarks.append(
-            doubt(
-                f"a second release at {again} s, though the file names one run; --end {name}={again} ends it there"
-            )
-        )
-    for level, samples in clipped(reading):
-        until = clock_text(float(clock[samples[-1]]))
-        cut = (
-            f"the peaks are cut off at {level:.4g} {unit}: {counted(samples.size, 'sample')} until {until} s"
-        )
-        remarks.append(doubt(f"{cut}; a later start, --start {name}={until}, leaves them out"))
+        fact = f"a second release at {again} s, though the file names one run"
+        remarks.append(doubt_of_motion(fact, f"--end {name}={again} ends it there"))
+    if cut := clipped(reading):
+        levels = " and ".join(f"{level:.4g}" for level, _ in cut)
+        count = counted(sum(samples.size for _, samples in cut), "sample")
+        until = clock_text(max(float(clock[samples[-1]]) for _, samples in cut))
+        fact = f"the peaks are cut off at {levels} {unit}: {count} until {until} s"
+        remarks.append(doubt_of_motion(fact, f"a later start, --start {name}={until}, leaves them out"))
     return remarks
 
 

@@ -126,8 +126,10 @@ def find_input(
         candidates = commands
     if len(candidates) > 1:
         listed = ", ".join(f"'{one_line(c.name, 40)}'" for c in candidates)
-        remedy = f'give --input "{one_line(candidates[0].name, 40)}", another of them, or --input none'
-        raise TunnelError(f"{len(candidates)} columns may be the input: {listed}", where=where, remedy=remedy)
+        option = f'--input "{one_line(candidates[0].name, 40)}"'
+        remedy = f"give {option}, another of them, or --input none"
+        what = f"{len(candidates)} columns may be the input: {listed}"
+        raise TunnelError(what, where=where, remedy=remedy, options=(option,))
     return _as_input(candidates[0], reading, choices, remarks, unit, where) if candidates else None
 
 

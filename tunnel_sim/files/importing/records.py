@@ -246,7 +246,7 @@ def _refusal(faults: Sequence[TunnelError]) -> TunnelError:
     """All refusals as one, which is `Unstated` where only the user can state what is open."""
     found = together(faults)
     if all(isinstance(fault, Unstated) for fault in faults):
-        return Unstated(found.what, where=found.where, remedy=found.remedy)
+        return Unstated(found.what, where=found.where, remedy=found.remedy, options=found.options)
     return found
 
 
@@ -270,8 +270,9 @@ def _sizes(parts: Sequence[ImportedRun], choices: ImportChoices) -> dict[str, fl
         for key, value in part.sizes.items():
             if common.setdefault(key, value) != value and getattr(choices.conditions, key) is None:
                 what = f"{key} = {value:g}, and {common[key]:g} in another run"
-                remedy = f"give --set {key}=NUMBER, or import them separately"
-                raise TunnelError(what, where=f"{shown(part.raw.source)}, run '{part.id}'", remedy=remedy)
+                option, where = f"--set {key}=NUMBER", f"{shown(part.raw.source)}, run '{part.id}'"
+                remedy = f"give {option}, or import them separately"
+                raise TunnelError(what, where=where, remedy=remedy, options=(option,))
     return common
 
 

@@ -261,7 +261,7 @@ def _piece(
         last = int(swings.reached[min(stop + 1, swings.at.size - 1)]) + 1
         before = swings.at[decay.start + 1 : stop + 1]
         last = free_until(time_s, reading, max(last, int(before[-1]) + 1), before, noise)
-        return RecordPiece(first, last, decay.doubt, held, stopped=True)
+        return RecordPiece(first, last, decay.doubt, held, stopped=following is None)
     last = reading.size
     if noise * _NOISES <= _BAND * 0.5 * swings.size[decay.start]:  # else the motion continues in the noise
         last = _without_long_rest(time_s, first, moved + 1)

@@ -12,20 +12,29 @@ class ImportRemark(str):
         text: the whole remark.
         short: the remark without the numbers that the table shows; None: the whole remark.
         doubt: whether the user has to judge it; the text then names the option that settles it.
+        motion: a doubt about the motion of one run without its option, for a chart of the run; empty for others.
     """
 
-    __slots__ = ("doubt", "short")
+    __slots__ = ("doubt", "motion", "short")
 
     short: str
     doubt: bool
+    motion: str
 
-    def __new__(cls, text: str, short: str | None = None, *, doubt: bool = False) -> ImportRemark:
+    def __new__(
+        cls, text: str, short: str | None = None, *, doubt: bool = False, motion: str = ""
+    ) -> ImportRemark:
         """A remark; arguments as above."""
         made = super().__new__(cls, text)
-        made.short, made.doubt = text if short is None else short, doubt
+        made.short, made.doubt, made.motion = text if short is None else short, doubt, motion
         return made
 
 
 def doubt(text: str, short: str | None = None) -> ImportRemark:
     """A remark that the user has to judge; arguments as in `ImportRemark`."""
     return ImportRemark(text, short, doubt=True)
+
+
+def doubt_of_motion(fact: str, settled: str = "") -> ImportRemark:
+    """A doubt about the motion of one run: the fact, and the option that settles it, empty where none does."""
+    return ImportRemark(f"{fact}; {settled}" if settled else fact, doubt=True, motion=fact)

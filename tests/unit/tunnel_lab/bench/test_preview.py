@@ -14,7 +14,8 @@ from tunnel_lab.bench.parts import page_words
 from tunnel_lab.bench.records import write
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.files.campaign_folder import read_campaign
-from tunnel_sim.files.importing.choices import read_recipe
+from tunnel_sim.files.importing.choices import ImportChoices, read_recipe
+from tunnel_sim.files.importing.imported_run import imported_run
 from tunnel_sim.files.importing.records import read_records
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -207,6 +208,8 @@ def test_a_page_speaks_of_fields_and_not_of_options() -> None:
 def test_a_second_release_in_a_run_that_a_file_names_is_to_be_judged(session: Session) -> None:
     imported = preview.read(session)[0]
     (part,) = imported.parts
-    named = replace(part, piece=replace(part.piece, again=1000))
-    (said,) = preview.doubts_of(named, imported)
-    assert said == "the body is released again at 5.00 s; move the end before it"
+    piece = replace(part.piece, again=1000)
+    named = imported_run("log", part.raw, piece, ImportChoices(), None, (), later=True)
+    (said,) = preview.doubts_of(named)
+    assert said == "a second release at 5 s, though the file names one run"
+    assert f"{said}; --end log=5 ends it there" in named.said  # the import's sentence, with its option

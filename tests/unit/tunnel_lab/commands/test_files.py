@@ -232,6 +232,9 @@ def test_a_folder_of_records_gets_the_command_that_imports_it(
     for path in paths:
         path.write_text(path.read_text().replace("yaw_rad", "pot [V]"))
     assert "--out 'day 1-campaign' --calibration \"a + b*V\"; it asks: " in tunnel("diagnose", "day 1")[2]
+    for path in paths:  # a column's name is not an option
+        path.write_text(path.read_text().replace("pot [V]", "give --overwrite now [V]"))
+    assert "--out 'day 1-campaign' --calibration \"a + b*V\"; it asks: " in tunnel("diagnose", "day 1")[2]
 
 
 @pytest.mark.parametrize("name", ["xGyro", "gyro_z", "YawRate", "Winkelgeschwindigkeit", "theta_dot"])
