@@ -98,7 +98,7 @@ def blind_rows(folder: Path, kinds: Sequence[str]) -> Iterator[Row]:
                         "std": value.std,
                         "held": bool(low <= truth[quantity] <= high),
                     }
-        yield row | {"effects_probability": bold.effects(campaign)}
+        yield row
 
 
 def calibration_rows(folder: Path) -> Iterator[Row]:

@@ -18,7 +18,6 @@ from scipy.special import chdtri
 
 from identification.campaign.derivatives import (
     Derivatives,
-    Design,
     build_design,
     combine,
     derivatives,
@@ -38,7 +37,7 @@ from identification.neural.posterior import (
     read_trained,
     shipped_posteriors,
 )
-from identification.neural.rivals import CAMPAIGN_NAMES, Features, Rivals, campaign_features, record_features
+from identification.neural.rivals import CAMPAIGN_NAMES, Rivals, campaign_features, record_features
 from identification.policy import MISFIT_DEVIATIONS, MISFIT_RATE, NOISE_TOLERANCE
 from identification.show.quantity import Quantity
 from identification.signal.free_decay import Decay
@@ -101,7 +100,8 @@ class NeuralPosterior:
         )
         estimate = Estimate(campaign.name, self.name, runs)
         statuses = statuses_of_runs(campaign, runs) | noise_statuses([run.noise for run in runs])
-        linked = _linked(found)
+        identified = [one for one in found if isinstance(one, _DemodulatedRun)]
+        linked = [one for one in identified if one.run.spring_stiffness is not None]
         if not linked or Status.NO_RUN_IDENTIFIED in statuses:
             return replace(estimate, statuses=by_severity(statuses))
         known_runs = [one.run for one in linked]
@@ -117,7 +117,9 @@ class NeuralPosterior:
         if combined is None:
             return replace(estimate, statuses=by_severity(statuses | {Status.NOT_DETERMINED}))
         statuses = statuses | design_statuses(design, combined[0])
-        features = _campaign_features(linked, design)
+        features = campaign_features(
+            known_runs, [one.windows for one in linked], design, [one.alone for one in linked]
+        )
         if features is None:
             nothing = Derivatives((), np.zeros(0), np.zeros((0, 0)))
             return filled_estimate(
@@ -151,17 +153,6 @@ class NeuralPosterior:
             intervals[name] = replace(quantity, interval=(ends[0], ends[1]))
         return replace(result, **intervals)
 
-    def effects(self, campaign: Campaign) -> dict[str, float]:
-        """Probability of every effect of the vocabulary in a campaign, by name; empty if it has no coefficients.
-
-        The probabilities come from simulated campaigns in which all effects are equally likely. They can order the
-        attempts of a diagnosis; they are not its answer.
-        """
-        linked = _linked(_runs(campaign.runs, self.networks["record"]))
-        runs = [one.run for one in linked]
-        features = _campaign_features(linked, build_design(runs, campaign.rig)) if linked else None
-        return {} if features is None else posteriors([features], self.networks["campaign"])[0].effects
-
 
 def _runs(runs: Sequence[Run], network: TrainedPosterior) -> list[_DemodulatedRun | Status]:
     windows = [demodulate(run.record) for run in runs]
@@ -180,12 +171,6 @@ def _runs(runs: Sequence[Run], network: TrainedPosterior) -> list[_DemodulatedRu
             seen = _DemodulatedRun(run, one, pair[1], posterior)
             found.append(Status.UNLIKE_TRAINING if posterior.unlike else seen)
     return found
-
-
-def _linked(found: Sequence[_DemodulatedRun | Status]) -> list[_DemodulatedRun]:
-    """The runs that were identified and state their spring."""
-    identified = [one for one in found if isinstance(one, _DemodulatedRun)]
-    return [one for one in identified if one.run.spring_stiffness is not None]
 
 
 def _described(seen: _DemodulatedRun, sensor: SensorProperties) -> RunEstimate:
@@ -222,8 +207,3 @@ def _described(seen: _DemodulatedRun, sensor: SensorProperties) -> RunEstimate:
         sensor_zero=Quantity(zero, seen.windows.noise / float(np.sqrt(weight.sum())), "rad"),
         noise=noise,
     )
-
-
-def _campaign_features(linked: Sequence[_DemodulatedRun], design: Design) -> Features | None:
-    runs, windows = [one.run for one in linked], [one.windows for one in linked]
-    return campaign_features(runs, windows, design, [one.alone for one in linked])

@@ -77,7 +77,7 @@ class Output:
         means: shape (b, r, d).
         scales: factor on each rival's own width, shape (b, r, 1).
         extras: added variance, shape (b, r, d).
-        effects: logits of the effects' probabilities, shape (b, e).
+        effects: logits of the effects' probabilities, which only the training uses, shape (b, e).
         context: of the sample, shape (b, CONTEXT), for the score of unlikeness.
     """
 
@@ -211,14 +211,12 @@ class TrainedPosterior:
         centre: mean context of the training samples, shape (c,).
         precision: inverse covariance of the context, shape (c, c).
         threshold: squared distance above which a sample is unlike all training samples.
-        effects: names of the effects in the order of their probabilities.
     """
 
     weights: Mapping[str, Array]
     centre: Array
     precision: Array
     threshold: float
-    effects: tuple[str, ...]
 
     def distance(self, context: Array) -> Array:
         """Squared Mahalanobis distance of contexts from the training samples, shape (b,)."""
@@ -267,8 +265,7 @@ def trained_of(weights: bytes, record: bytes, where: str) -> dict[str, TrainedPo
             if not all(np.all(np.isfinite(value)) for value in own.values()):
                 raise ValueError(kind)
             centre, precision = own.pop("unlike.centre"), own.pop("unlike.precision")
-            threshold, effects = float(stated["threshold"]), tuple(document["effects"])
-            trained[kind] = TrainedPosterior(own, centre, precision, threshold, effects)
+            trained[kind] = TrainedPosterior(own, centre, precision, float(stated["threshold"]))
         return trained
 
 
@@ -289,7 +286,6 @@ class Posterior:
     values: Array
     intervals: Array
     covariance: Array
-    effects: dict[str, float]
     unlike: bool
 
     def quantity(self, place: int, unit: str) -> Quantity:
@@ -323,7 +319,6 @@ def posteriors(samples: Sequence[Features], network: TrainedPosterior) -> list[P
     weights, variance = np.exp(output.logarithms), variances(output, widths)
     found = quantiles(weights, output.means, np.sqrt(variance))
     distances = network.distance(output.context)
-    chances = 1.0 / (1.0 + np.exp(-np.clip(output.effects, -30.0, 30.0)))
     result = []
     for place, sample in enumerate(samples):
         low, middle, high = sample.values + sample.stds * found[place]
@@ -343,7 +338,6 @@ def posteriors(samples: Sequence[Features], network: TrainedPosterior) -> list[P
                 middle,
                 np.column_stack((low, high)),
                 related * np.outer(stds, stds),
-                dict(zip(network.effects, chances[place].tolist(), strict=True)),
                 bool(distances[place] > network.threshold and sample.rivals[0, LEVEL] > _NOISY),
             )
         )

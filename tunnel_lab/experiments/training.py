@@ -173,7 +173,7 @@ def judged(
     covariance = np.cov(seen.T)
     covariance += _SHRINK * float(np.trace(covariance)) / len(covariance) * np.eye(len(covariance))
     trained = TrainedPosterior(
-        weights, seen.mean(axis=0), np.asarray(np.linalg.inv(covariance), np.float64), np.inf, FAMILIES
+        weights, seen.mean(axis=0), np.asarray(np.linalg.inv(covariance), np.float64), np.inf
     )
     distances = trained.distance(contexts(weights, apart))
     return replace(trained, threshold=float(np.quantile(distances, 1.0 - FALSE_ALARMS)))

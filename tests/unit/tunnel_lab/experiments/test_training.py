@@ -13,7 +13,6 @@ from tests.reference.rigs import rig
 from tunnel_lab.cli import main
 from tunnel_reference.catalogue import Group
 from tunnel_reference.forms import FORMS
-from tunnel_sim.effects import ALL_EFFECTS, BetweenRuns
 
 WORDS = ["-e", "neural_posterior", "--shards", "1", "--steps", "4", "--jobs", "0"]
 
@@ -107,7 +106,6 @@ def test_variants_of_a_campaign_lose_runs_and_ends_and_differ_in_noise(monkeypat
 
 @pytest.mark.parametrize("factor", [0.1, 10.0])
 def test_a_size_of_an_effect_that_diverges_is_moved_towards_its_usual_size(factor):
-    from dataclasses import replace
 
     from tunnel_lab.experiments.training_samples import nearer
     from tunnel_reference.draw import Mixture, draw_campaign
@@ -119,7 +117,6 @@ def test_a_size_of_an_effect_that_diverges_is_moved_towards_its_usual_size(facto
 
 
 def test_the_flexible_rod_moves_as_the_reference_integrator_says():
-    from dataclasses import replace
 
     from tunnel_lab.experiments.training_samples import flexible_motion
     from tunnel_reference.draw import draw_conditions, with_defaults
@@ -146,14 +143,3 @@ def test_white_noise_tells_as_much_at_the_rate_of_training():
         return (1.0 - c.coloured_share) * c.noise_std**2 / c.sample_rate, c.coloured_share * c.noise_std**2
 
     assert parts(slow) == pytest.approx(parts(fast))
-
-
-def test_effects_are_weighed_without_the_runs_that_cannot_be_read():
-    whole = campaign(TWELVE[:5], noise=5e-4, rate=500.0, rng=np.random.default_rng(3))
-    swing = whole.runs[-1].record
-    dead = replace(whole.runs[-1], record=replace(swing, yaw_rad=np.zeros_like(swing.yaw_rad)))
-    found = NeuralPosterior().effects(replace(whole, runs=(*whole.runs[:-1], dead)))
-    assert found == NeuralPosterior().effects(replace(whole, runs=whole.runs[:-1]))
-    # it takes free decays, and was trained on campaigns that repeat, before the vocabulary had these two
-    known = {kind.name for kind in ALL_EFFECTS if not (kind.driven or issubclass(kind, BetweenRuns))}
-    assert set(found) == known - {"ambient_vibration", "reynolds_dependence"}
