@@ -142,17 +142,17 @@ def spread(campaign: Campaign, count: int = 4) -> tuple[Run, ...]:
 def view(
     *,
     request: Annotated[
-        Request, {"duration": "Time until the next release, s.", "seed": "Seed of random effects."}
+        Request, {"duration": "Duration of drawn effects, s.", "seed": "Seed of random effects."}
     ],
-    speed: Annotated[float, Option("--speed", min=0.01, max=100.0, help="Factor on real time.")] = 1.0,
+    speed: Annotated[float, Option("--speed", min=0.001, max=1.0, help="Factor on real time.")] = 1.0,
     camera: Annotated[
         str, Option("--camera", help="overview, above or side: where the view begins.")
     ] = "overview",
 ) -> None:
-    """Watch the rig in real time; the model is released again when a run is over.
+    """Watch the rig in real time, in MuJoCo's viewer.
 
-    In the window (MuJoCo's viewer) space pauses, R releases the model again and the
-    mouse turns the view; a figure shows the angle. The window needs a display.
+    Space pauses, Ctrl+L releases the model again, - and = change the speed, the mouse
+    turns the view, and F1 lists all keys. The window needs a display.
 
     [bold]Examples[/bold]
       tunnel view

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
 import gc
 import warnings
 from pathlib import Path
-from types import SimpleNamespace
 
+import mujoco
 import numpy as np
 import pytest
 
 from tests.skips import PLATFORM
 from tests.support.command import Tunnel
 from tunnel_lab.show.film import Look, backends, draw_trace, shown_run, write_film
-from tunnel_lab.show.live import Controls, History, LiveRun, missing_display, window_loop
+from tunnel_lab.show.live import missing_display, view_in_window
 from tunnel_lab.show.request import Request
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
@@ -151,85 +150,21 @@ def test_what_is_shown_is_the_plans_run() -> None:
     assert Request.from_json_dict(as_json(request)) == request
 
 
-def test_the_live_run_is_the_simulated_one_and_begins_again() -> None:
-    run = shown_run(Request(duration=1.0))
+def test_the_viewer_gets_the_run_from_its_release(monkeypatch) -> None:
+    glfw, viewer = pytest.importorskip("glfw"), pytest.importorskip("mujoco.viewer")
+    launched = {}
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setattr(glfw, "init", lambda: True)
+    monkeypatch.setattr(viewer, "launch", lambda **given: launched.update(given))
+    run = shown_run(Request(duration=1.0, effects=("unsteady_aero_lag:lag=0.1",)))
+    view_in_window(run, camera="side", speed=0.5)
     motion = simulate_motion(build_model(run.rig, run.settings), 1000.0)
-    live = LiveRun(run)
-    for _ in range(5):
-        live.advance(0.1)
-    assert live.data.time == pytest.approx(0.5)
-    assert live.angle == pytest.approx(motion.angle[500], abs=1e-12)
-    time_, angle = live.history.points.T
-    assert np.diff([0.0, *time_, 0.5]).max() < 0.03  # s: also within an advance of a tenth of a second
-    np.testing.assert_allclose(angle, motion.angle[np.round(1000.0 * time_).astype(int)], atol=1e-12)
-    live.advance(0.6)
-    live.advance(0.0)
-    assert live.history.points.tolist() == [[0.0, run.settings.release_angle]]
-    assert live.data.time == 0.0
-    assert live.angle == pytest.approx(run.settings.release_angle)
-
-
-def test_the_history_keeps_the_last_seconds_and_begins_anew() -> None:
-    history = History(span=1.0, points=10)
-    for time_ in np.arange(0.0, 3.0, 0.01):
-        history.add(float(time_), 2.0 * float(time_))
-    points = history.points
-    assert len(points) == 10
-    assert points[-1, 0] > 2.85
-    np.testing.assert_allclose(points[:, 1], 2.0 * points[:, 0])
-    history.add(0.0, 1.0)
-    assert history.points.tolist() == [[0.0, 1.0]]
-
-
-class Window:
-    """Stands in for MuJoCo's passive viewer: closed after so many frames."""
-
-    def __init__(self, frames: int) -> None:
-        self.frames, self.viewport, self.seen = frames, None, []
-
-    def is_running(self) -> bool:
-        self.frames -= 1
-        return self.frames >= 0
-
-    def lock(self):
-        return contextlib.nullcontext()
-
-    def set_figures(self, figures) -> None:
-        corner, figure = figures
-        self.seen.append(int(figure.linepnt[0]))
-        self.corner = (corner.left, corner.bottom, corner.width, corner.height)
-        self.trace = np.array(figure.linedata[0]).reshape(-1, 2)
-
-    def set_texts(self, texts) -> None:
-        assert "pause" in texts[3]
-
-    def sync(self) -> None:
-        pass
-
-
-def test_the_window_follows_the_clock_and_the_keys() -> None:
-    live = LiveRun(shown_run(Request(duration=5.0)))
-    controls = Controls(live)
-    clock = SimpleNamespace(now=0.0)
-
-    def sleep(seconds: float) -> None:
-        clock.now += max(seconds, 1.0 / 60.0)
-
-    window = Window(61)
-    window_loop(window, live, controls, 1.0, clock=lambda: clock.now, sleep=sleep)
-    assert live.data.time == pytest.approx(1.0, abs=0.05)
-    assert window.seen[-1] > 20
-    last = window.trace[window.seen[-1] - 1]
-    np.testing.assert_allclose(last, [live.data.time, live.angle], atol=1e-6)  # drawn in single precision
-    assert not window.trace[window.seen[-1] :].any()
-    assert window.corner == (800, 0, 400, 225)  # lower right of a window whose size is not yet known
-    controls.key(32)
-    before = live.data.time
-    window_loop(Window(10), live, controls, 1.0, clock=lambda: clock.now, sleep=sleep)
-    assert live.data.time == before
-    controls.key(82)
-    window_loop(Window(1), live, controls, 1.0, clock=lambda: clock.now, sleep=sleep)
-    assert live.data.time == 0.0
+    for _ in range(2):  # loading again releases again
+        model, data = launched["loader"]()
+        assert model.camera(model.vis.global_.cameraid).name == "side"
+        assert model.vis.global_.realtime == pytest.approx(0.5)
+        mujoco.mj_step(model, data, round(0.5 / model.opt.timestep))
+        assert data.joint("yaw").qpos[0] == pytest.approx(motion.angle[500], abs=1e-12)
 
 
 def test_no_display_is_one_clear_line(tunnel: Tunnel, monkeypatch) -> None:
