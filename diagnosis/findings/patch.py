@@ -7,10 +7,11 @@ from typing import Final
 
 from diagnosis.findings.judged import Judged
 from diagnosis.findings.next_step import NextStep
-from diagnosis.patch.written_model import PatchedModel, WrittenAttribute
+from diagnosis.patch.written_model import PatchedModel
 from identification.show.blocks import TextTable
 from identification.show.numbers import listed, reading_shown, significant, unit_mark, with_std
 from tunnel_sim.vocabulary.dimensions import beside
+from tunnel_sim.vocabulary.rig import WrittenAttribute
 
 FILE_OFF_STDS: Final = 2.0
 """Maximum deviation of a coefficient, in standard deviations, at which the value in the model's file fits.

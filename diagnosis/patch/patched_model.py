@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, reduce
 from pathlib import Path
 from typing import Final
 
@@ -108,7 +108,6 @@ def found_law(
     rate = reach * turn
     r = np.linspace(-rate, rate, _GRID)
     differences: list[Fact] = []
-    may_miss = np.inf if native_only else PATCHED_MISSES
     loss = physics.parameters.get("loss_factor", 0.0) * np.sqrt(
         physics.spring_stiffness * physics.yaw_inertia
     )
@@ -126,40 +125,20 @@ def found_law(
         differences.append(Fact("own law left out"))
     if own_program and program:
         program = (_number("number"), 0.0, *program)
-    known = {"Kr": physics.spring_stiffness, **physics.parameters}
-    for terms, name, grid, forms, native in (
-        (OF_ANGLE, "b", b, (b**0, b, b**2, b**3), spring),
-        (OF_RATE, "r", r, (r, np.abs(r) * r, r**3), damping),
-    ):
-        for coefficient, words, text in terms:
-            if physics.parameters.get(coefficient, 0.0) == 0.0:
-                continue
-            formula = parse(text, _NAMES)
-            values = {
-                constant: known.get(constant, 0.0) or TEXTBOOK_POWERS.get(constant, 0.0)
-                for constant in formula.names - {"b", "r"}
-            }
-            wanted = -formula.value({**values, name: grid})
-            columns, greatest = np.array(forms).T, np.max(np.abs(wanted))
-            least = np.full(len(forms), -np.inf)
-            if native_only and name == "r":
-                least[0] = -(native[0] + law.damping)
-            found = nearest_polynomial(columns, wanted, least)
-            found[np.abs(found) * np.max(np.abs(columns), axis=0) < 1e-9 * greatest] = 0.0
-            missed = float(np.max(np.abs(columns @ found - wanted)) / greatest)
-            falls = name == "r" and native[0] + law.damping + found[0] < 0.0
-            if native_only or (missed < may_miss and not falls):
-                native += found
-                if missed >= 1e-6:
-                    figures = {"moment": words, "missed_percent": 100.0 * missed}
-                    differences.append(Fact("polynomial", figures))
-            else:
-                program = _added(program, formula.program(values, {"b": "angle", "r": "rate"}))
-                differences.append(Fact("no native element", {"moment": words}))
+    spring, of_angle, said_of_angle = _native(
+        physics, OF_ANGLE, np.array((b**0, b, b**2, b**3)).T, ("b", b), spring, native_only=native_only
+    )
+    damping, of_rate, said_of_rate = _native(
+        physics, OF_RATE, np.array((r, np.abs(r) * r, r**3)).T, ("r", r), damping, law.damping,
+        native_only=native_only,
+    )  # fmt: skip
+    program = reduce(_added, (*of_angle, *of_rate), program)
+    differences += [*said_of_angle, *said_of_rate]
     loads = _loads(problem, common, release) if physics.parameters.get("friction_load", 0.0) else ()
     carried = Carried.over(physics.parameters, loads) if loads else Carried()
+    may_miss = np.inf if native_only else PATCHED_MISSES
     friction = native_friction(physics.parameters, r[r > 0.0], law, float(damping[0]), may_miss, carried)
-    damping += friction.damping
+    damping = damping + friction.damping
     program = _added(program, friction.program)
     differences += friction.differences
     rest = law.rest + data.similarity.rest
@@ -182,6 +161,57 @@ def found_law(
         noise=noise,
     )
     return FoundLaw(patch, (*differences, *_unwritten(physics, problem, actuator)))
+
+
+def _native(
+    physics: RunSettings,
+    terms: Sequence[tuple[str, str, str]],
+    columns: Array,
+    known: tuple[str, Array],
+    native: Array,
+    beside: float | None = None,
+    *,
+    native_only: bool,
+) -> tuple[Array, list[tuple[float, ...]], list[Fact]]:
+    """The polynomial of a spring or damper with the terms of a law that are near one.
+
+    Args:
+        terms: coefficient, words and formula of each.
+        columns: powers on a grid, shape (n, m).
+        known: the formulas' variable and its values on the grid, shape (n,).
+        native: the polynomial without the terms, shape (m,).
+        beside: damping of the joint as given, N m s/rad: no sum may be negative; None: any may be.
+        native_only: as in `found_law`.
+
+    Returns:
+        The polynomial, shape (m,), the programs of the other terms, and the differences.
+    """
+    constants = {"Kr": physics.spring_stiffness, **physics.parameters}
+    programs, differences = list[tuple[float, ...]](), list[Fact]()
+    for coefficient, words, text in terms:
+        if physics.parameters.get(coefficient, 0.0) == 0.0:
+            continue
+        formula = parse(text, _NAMES)
+        values = {
+            constant: constants.get(constant, 0.0) or TEXTBOOK_POWERS.get(constant, 0.0)
+            for constant in formula.names - {"b", "r"}
+        }
+        wanted = -formula.value({**values, known[0]: known[1]})
+        greatest, least = np.max(np.abs(wanted)), np.full(native.size, -np.inf)
+        if native_only and beside is not None:
+            least[0] = -(native[0] + beside)
+        found = nearest_polynomial(columns, wanted, least)
+        found[np.abs(found) * np.max(np.abs(columns), axis=0) < 1e-9 * greatest] = 0.0
+        missed = float(np.max(np.abs(columns @ found - wanted)) / greatest)
+        falls = beside is not None and native[0] + beside + found[0] < 0.0
+        if native_only or (missed < PATCHED_MISSES and not falls):
+            native = native + found
+            if missed >= 1e-6:
+                differences.append(Fact("polynomial", {"moment": words, "missed_percent": 100.0 * missed}))
+        else:
+            programs.append(formula.program(values, {"b": "angle", "r": "rate"}))
+            differences.append(Fact("no native element", {"moment": words}))
+    return native, programs, differences
 
 
 def _loads(problem: Problem, common: Array, release: Array) -> list[tuple[Array, Array]]:

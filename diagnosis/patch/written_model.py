@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -12,12 +11,12 @@ from diagnosis.settings import AnswerSettings
 from tunnel_sim.files.from_json import UNWRITTEN
 from tunnel_sim.files.writing import as_json
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.rig import WrittenAttribute
 
 if TYPE_CHECKING:
     import mujoco
 
     from tunnel_sim.engine.joint_model import JointModel
-    from tunnel_sim.engine.joint_patch import Written
 
 PATCH_EXCUSED: Final = 0.001
 """Share of the gap that the fit leaves, below which a part of the causes that cannot be written into the
@@ -88,22 +87,6 @@ class EngineModel:
 
 
 @dataclass(frozen=True)
-class WrittenAttribute:
-    """An attribute that the patch changed, in SI units.
-
-    Args:
-        name: its element and name.
-        before: values in the given model, in ``unit``.
-        after: values in the patched one, in ``unit``.
-    """
-
-    name: str
-    before: tuple[float, ...]
-    after: tuple[float, ...]
-    unit: str
-
-
-@dataclass(frozen=True)
 class NativeForm:
     """The nearest model of MuJoCo's own elements.
 
@@ -162,7 +145,11 @@ class PatchedModel:
 
     @classmethod
     def of(
-        cls, engine: EngineModel, written: Sequence[Written], differences: tuple[Fact, ...], zero: float
+        cls,
+        engine: EngineModel,
+        written: tuple[WrittenAttribute, ...],
+        differences: tuple[Fact, ...],
+        zero: float,
     ) -> PatchedModel:
         """The patched model with its closure.
 
@@ -176,7 +163,7 @@ class PatchedModel:
             free=tuple(given.law.free),
             rest_rad=given.law.rest,
             zero_rad=zero,
-            written=tuple(WrittenAttribute(one.name, one.before, one.after, one.unit) for one in written),
+            written=written,
             notes=(),
             differences=differences,
             closed=closure.native_closed,

@@ -20,6 +20,7 @@ from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.run_settings import Motion
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, shown
+from tunnel_sim.vocabulary.rig import WrittenAttribute
 
 # the plugin wants them
 _AIR = ("air_density", "wind_speed", "frontal_area", "reference_length", "cn_beta", "cn_r")
@@ -98,19 +99,9 @@ class Start:
     drive: DriveMoment | None = None
 
 
-@dataclass(frozen=True)
-class Written:
-    """A written attribute, in SI units: its element and name, its values before and after, the unit."""
-
-    name: str
-    before: tuple[float, ...]
-    after: tuple[float, ...]
-    unit: str
-
-
 def patched(
     model: JointModel, patch: JointPatch, starts: Sequence[Start] = ()
-) -> tuple[mujoco.MjSpec, tuple[Written, ...]]:
+) -> tuple[mujoco.MjSpec, tuple[WrittenAttribute, ...]]:
     """The model with a law written into it, its runs' starts as keyframes, and the written attributes."""
     spec = model.spec()
     before = spec.compile()
@@ -164,9 +155,10 @@ def patched(
     old, new = _attributes(before), _attributes(after)
     spring = any(new["joint stiffness", "N m/rad, /rad2, /rad3"])
     return spec, tuple(
-        Written(name, old[name, unit], value, unit)
+        WrittenAttribute(name, before, value, unit)
         for (name, unit), value in new.items()
-        if not np.allclose(value, old[name, unit], rtol=1e-9, atol=0.0)
+        # an added actuator has no values before
+        if not np.allclose(value, before := old.get((name, unit), (0.0,) * len(value)), rtol=1e-9, atol=0.0)
         and (spring or name != "joint springref")
     )
 

@@ -1,4 +1,4 @@
-"""The rig: its body, its reference sizes, and the law of a joint of the user's model."""
+"""The rig: its body, its reference sizes, and a joint of the user's model: its law, and a changed attribute."""
 
 from __future__ import annotations
 
@@ -140,6 +140,22 @@ def davis_vertices(body: Body) -> Array:
         layers += [np.insert(shrunk, 1, side * offset, axis=1) for side in (-1.0, 1.0)]
     # angle 0: full profile at reduced width; angle pi/2: shrunk profile at full width
     return np.concatenate(layers)
+
+
+@dataclass(frozen=True)
+class WrittenAttribute:
+    """An attribute of a user's model that a patch changed, in SI units.
+
+    Args:
+        name: its element and name.
+        before: values in the given model, in ``unit``.
+        after: values in the patched one, in ``unit``.
+    """
+
+    name: str
+    before: tuple[float, ...]
+    after: tuple[float, ...]
+    unit: str
 
 
 @dataclass(frozen=True)

@@ -76,3 +76,20 @@ def test_presliding_friction_is_native(tmp_path: Path, kind: str, integrator: st
     np.testing.assert_allclose(
         found.angle[kept], contact(model.law.inertia, found.time_s[kept]), atol=allowed, rtol=0.0
     )
+
+
+@pytest.mark.usefixtures("models_in_this_process")
+def test_a_constant_moment_without_an_actuator_is_the_bias_of_an_added_one(tmp_path: Path) -> None:
+    path = tmp_path / "model.xml"
+    path.write_text(
+        """<mujoco><option gravity="0 0 0"/><worldbody><body><joint name="elbow" axis="0 1 0" damping="0.02"/>
+<geom type="sphere" size="0.05" mass="0.2"/></body></worldbody></mujoco>"""
+    )
+    model = read_joint_model(path, "elbow", Recorded(0.5, 0.0))
+    spec, written = patched(model, JointPatch(model.law.inertia, (0.1, 0.0, 0.0, 0.0)))
+    (one,) = written
+    assert (one.name, one.before) == ("actuator moment without control", (0.0,))
+    assert one.after == pytest.approx((-0.1,))
+    data = mujoco.MjData(compiled := spec.compile())
+    mujoco.mj_forward(compiled, data)
+    assert data.qfrc_actuator[0] == pytest.approx(-0.1)
