@@ -13,23 +13,21 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, ClassVar
 
 import numpy as np
 
-from identification.campaign.derivatives import build_design, combine, has_size, loads, wind_off
-from identification.campaign.run_scatter import (
-    MeasuredRuns,
-    ScatterFit,
-    scatter_between,
-)
+from identification.campaign.derivatives import has_size, loads, wind_off
+from identification.campaign.linked_runs import LinkedRuns
+from identification.campaign.run_scatter import ScatterFit
 from identification.campaign.springs import inertia_of_springs
 from identification.estimate import PARAMETERS, UNITS, Estimate, RunEstimate, Status, by_severity
 from identification.policy import LEAST_FOR_SCATTER
 from identification.progress import counted
 from identification.show.quantity import Quantity
-from identification.statistics import decay_covariance, determined, inverse, widened_covariance
+from identification.signal.run_fit import Gained
+from identification.statistics import decay_covariance, determined, widened_covariance
 from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
@@ -52,6 +50,17 @@ class PairedRun:
     frequency_std: float
     rate: float
     rate_std: float
+
+    @cached_property
+    def gained(self) -> Gained | None:
+        """Decay rate and stiffness; a free decay has no gain. None where their deviations are not determined."""
+        omega, variances = (
+            2.0 * np.pi * self.frequency,
+            (self.rate_std**2, (2.0 * np.pi * self.frequency_std) ** 2),
+        )
+        covariance = decay_covariance(self.rate, omega, *variances)
+        values = np.array([self.rate, omega**2 + self.rate**2, 0.0])
+        return Gained.of(values, covariance) if determined(covariance) else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,25 +116,6 @@ def _mean_std(values: Array) -> float:
     if values.size < LEAST_FOR_SCATTER:
         return 0.0
     return float(values.std(ddof=1)) / float(np.sqrt(values.size))
-
-
-def _scatter(campaign: Campaign, seen: Sequence[PairedRun]) -> ScatterFit | None:
-    """The scatter between the runs, computed as for every method; None if it does not count."""
-    design = build_design([one.run for one in seen], campaign.rig)
-    values, weights = [], []
-    for one in seen:
-        omega, stds = 2.0 * np.pi * one.frequency, (one.rate_std, 2.0 * np.pi * one.frequency_std)
-        covariance = decay_covariance(one.rate, omega, stds[0] ** 2, stds[1] ** 2)
-        if not determined(covariance):
-            return None
-        values.append(np.array([one.rate, omega**2 + one.rate**2]))
-        weights.append(inverse(covariance))
-    start = combine(design, np.array(values), weights)
-    if start is None:
-        return None
-    runs = [one.run for one in seen]
-    measured = MeasuredRuns.of(runs, design, values, weights, start[0])
-    return scatter_between(measured, start[0], campaign.repeatability)
 
 
 def _moved(outcome: Callable[[Array, Array], Array], centre: Array, scatter: ScatterFit) -> list[Array]:
@@ -251,7 +241,11 @@ class Paired(ABC):
         if windy and not has_size(campaign.rig):
             statuses.add(Status.NO_REFERENCE_SIZE)
         seen = [one for one, _ in sprung]
-        scatter = _scatter(campaign, seen) if pairing.off else None
+        scatter = None  # computed as for every method
+        if pairing.off and all(one.gained is not None for one in seen):
+            scatter = LinkedRuns.of(
+                campaign, [None if one is None else one.gained for _, one in found]
+            ).scatter
         between = None if scatter is None else scatter.described()
         line = wind_off(estimate.runs, campaign.runs, between)
         if pairing.off and line["wind_off_inertia"] is None:

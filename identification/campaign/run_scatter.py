@@ -84,22 +84,6 @@ class MeasuredRuns:
     weights: Sequence[Array]
     moves: Sequence[Array]
 
-    @classmethod
-    def of(
-        cls,
-        runs: Sequence[Run],
-        design: Design,
-        seen: Sequence[Array],
-        weights: Sequence[Array],
-        start: PerParameter,
-    ) -> MeasuredRuns:
-        """Runs about common parameters.
-
-        Args:
-            design: of the runs, with the gains of inputs.
-        """
-        return cls(design.links, seen, weights, moves_of(runs, design, start))
-
     def misfit(self, parameters: Array) -> float:
         """χ² of common parameters, shape (p,), without scatter."""
         away = [seen - link @ parameters for seen, link in zip(self.seen, self.links, strict=True)]

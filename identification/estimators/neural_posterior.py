@@ -18,8 +18,6 @@ from scipy.special import chdtri
 
 from identification.campaign.derivatives import (
     Derivatives,
-    build_design,
-    combine,
     derivatives,
     design_statuses,
     filled_estimate,
@@ -27,7 +25,7 @@ from identification.campaign.derivatives import (
     noise_statuses,
     statuses_of_runs,
 )
-from identification.campaign.run_scatter import MeasuredRuns, scatter_between
+from identification.campaign.linked_runs import LinkedRuns
 from identification.estimate import Estimate, NoiseLevel, RunEstimate, Status, by_severity
 from identification.neural.demodulated import Demodulated, demodulate
 from identification.neural.posterior import (
@@ -42,10 +40,8 @@ from identification.policy import MISFIT_DEVIATIONS, MISFIT_RATE, NOISE_TOLERANC
 from identification.show.quantity import Quantity
 from identification.signal.free_decay import Decay
 from identification.signal.noise import stated_noise
-from identification.signal.run_fit import residual_check
-from identification.statistics import inverse
+from identification.signal.run_fit import Gained, residual_check
 from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
-from tunnel_sim.vocabulary.record import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +58,14 @@ class _DemodulatedRun:
         """Decay rate, 1/s, and damped angular frequency, rad/s, of the nominal fit."""
         rate, omega = np.array([self.windows.rate, self.windows.omega]) + self.alone.parameters
         return float(rate), float(omega)
+
+    @property
+    def gained(self) -> Gained:
+        """Decay rate and stiffness of the nominal fit; a free decay has no gain."""
+        rate, omega = self.rate_and_omega
+        slopes = np.array([[1.0, 0.0], [2.0 * rate, 2.0 * omega]])
+        covariance = slopes @ self.alone.covariances[0] @ slopes.T
+        return Gained.of(np.array([rate, omega**2 + rate**2, 0.0]), covariance)
 
 
 @dataclass(frozen=True)
@@ -100,25 +104,16 @@ class NeuralPosterior:
         )
         estimate = Estimate(campaign.name, self.name, runs)
         statuses = statuses_of_runs(campaign, runs) | noise_statuses([run.noise for run in runs])
-        identified = [one for one in found if isinstance(one, _DemodulatedRun)]
-        linked = [one for one in identified if one.run.spring_stiffness is not None]
-        if not linked or Status.NO_RUN_IDENTIFIED in statuses:
+        linked = LinkedRuns.of(campaign, [None if isinstance(one, Status) else one.gained for one in found])
+        if not linked.runs:
             return replace(estimate, statuses=by_severity(statuses))
-        known_runs = [one.run for one in linked]
-        design = build_design(known_runs, campaign.rig)
-        decays: list[Array] = []  # (a, k) of the runs from their nominal fits
-        informations = []
-        for one in linked:
-            rate, omega = one.rate_and_omega
-            decays.append(np.array([rate, omega**2 + rate**2]))
-            slopes = np.array([[1.0, 0.0], [2.0 * rate, 2.0 * omega]])
-            informations.append(inverse(slopes @ one.alone.covariances[0] @ slopes.T))
-        combined = combine(design, np.array(decays), informations)
-        if combined is None:
+        known_runs, design = linked.runs, linked.design
+        if linked.least_squares is None:
             return replace(estimate, statuses=by_severity(statuses | {Status.NOT_DETERMINED}))
-        statuses = statuses | design_statuses(design, combined[0])
+        statuses = statuses | design_statuses(design, linked.least_squares[0])
+        shown = [one for place in linked.places if not isinstance(one := found[place], Status)]
         features = campaign_features(
-            known_runs, [one.windows for one in linked], design, [one.alone for one in linked]
+            known_runs, [one.windows for one in shown], design, [one.alone for one in shown]
         )
         if features is None:
             nothing = Derivatives((), np.zeros(0), np.zeros((0, 0)))
@@ -132,9 +127,8 @@ class NeuralPosterior:
         names = tuple(CAMPAIGN_NAMES[place] for place in known)
         values = Derivatives(names, posterior.values[known], np.eye(known.size))
         covariance, repeatability = posterior.covariance[np.ix_(known, known)], None
-        measured = MeasuredRuns.of(known_runs, design, decays, informations, combined[0])
-        scatter = scatter_between(measured, combined[0], campaign.repeatability)
-        linear = derivatives(design, combined[0] if scatter is None else scatter.parameters)
+        scatter = linked.scatter
+        linear = derivatives(design, linked.least_squares[0] if scatter is None else scatter.parameters)
         if scatter is not None and set(names) <= set(linear.names):
             # the network knows only the noise; the scatter is added, as in a linear combination of the runs
             rows = linear.jacobian[[linear.names.index(name) for name in names]]

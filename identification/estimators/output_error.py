@@ -13,6 +13,7 @@ from typing import ClassVar
 from identification.campaign.combination import scattering_estimate
 from identification.campaign.derivatives import loads, statuses_of_runs
 from identification.campaign.joint import joint_estimate
+from identification.campaign.linked_runs import LinkedRuns
 from identification.estimate import Estimate, Status, by_severity
 from identification.progress import counted
 from identification.signal.run_fit import identify_run
@@ -48,5 +49,6 @@ class OutputError:
         statuses = statuses_of_runs(campaign, estimate.runs)
         if Status.NO_RUN_IDENTIFIED in statuses:
             return replace(estimate, statuses=by_severity(statuses))
-        scattering = scattering_estimate(campaign, self.name, fitted)
-        return scattering or joint_estimate(campaign, estimate, fitted, statuses)
+        linked = LinkedRuns.of(campaign, [item.gained for item in fitted])
+        scattering = scattering_estimate(linked, self.name, fitted)
+        return scattering or joint_estimate(linked, estimate, fitted, statuses)

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.campaign.combination import with_gains
 from identification.campaign.derivatives import Design, build_design, derivatives, has_size
+from identification.campaign.linked_runs import with_gains
 from identification.campaign.run_scatter import moves_of
 from identification.estimate import PARAMETERS
 from identification.signal.decay_fit import Reading, information_at, run_at, shared_system

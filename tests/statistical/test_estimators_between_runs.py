@@ -11,9 +11,8 @@ import pytest
 from scipy.stats import binom
 
 from identification import identify
-from identification.campaign import combination, pairing
+from identification.campaign import linked_runs
 from identification.estimators import ALL_ESTIMATORS
-from identification.estimators import neural_posterior as network
 from tests.marks import slow
 from tests.reference.free_decays import Setting, Truth, campaign
 from tests.reference.scattering import THREE_SPRINGS, USUAL, scattering
@@ -56,8 +55,7 @@ def objections(counts, trials):
 
 def without_scatter(patch):
     """Every estimator as it is where no run scatters."""
-    for module in (combination, pairing, network):
-        patch.setattr(module, "scatter_between", lambda *_: None)
+    patch.setattr(linked_runs, "scatter_between", lambda *_: None)
 
 
 REFUSES = "neural_posterior"  # what is unlike its training
