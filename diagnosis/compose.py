@@ -32,7 +32,7 @@ from diagnosis.findings.friction_curve import FrictionCurve, friction_curve
 from diagnosis.findings.hidden import Hidden
 from diagnosis.findings.input_hold import other_hold
 from diagnosis.findings.judgements import cautions, immaterial, nearly, outside_the_fits, zeros_apart
-from diagnosis.findings.next_run import NextRun
+from diagnosis.findings.next_run import FurtherRuns, NextRun
 from diagnosis.findings.other_motions import TwoModes, recognised_limit_cycles, second_modes
 from diagnosis.findings.passive import within_bounds
 from diagnosis.findings.remainder import Remainder, remainder
@@ -165,6 +165,9 @@ def composed(
     rivals = _rivals(study)
     beside = [answer.hypothesis.fit for answer in rivals if answer.hypothesis is not None]
     next_run = NextRun.between(fitted, beside[0]) if beside and fitted is not study.nominal else None
+    further = None
+    if not (withheld or cycling):
+        further = FurtherRuns.narrowing(study.stated, named.coefficients.after)
     caveats = _caveats(study, chosen, closes, unpatched, of_remainder, named)
     return Diagnosis(
         campaign=study.campaign.name,
@@ -177,6 +180,7 @@ def composed(
             sorted({name for answer in rivals for name in answer.effects} - set(study.causes))
         ),
         next_run=None if next_run is None else next_run.own(similarity),
+        further_runs=None if further is None else further.own(similarity),
         coefficients=Coefficients({}, {}) if withheld else named.coefficients,
         confirmation=closes.confirmation.scaled(similarity.own(1.0, similarity.reading)),
         noise=_noise(study),

@@ -1,22 +1,28 @@
-"""The run that would distinguish two fitted models."""
+"""Runs to make: the one that would distinguish two fitted models, and those that narrow a coefficient."""
 
 from __future__ import annotations
 
 import dataclasses
 import itertools
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
+from diagnosis.answer.linear_theory import coefficient_gradients
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.likelihood.normal_equations import project_release
+from diagnosis.likelihood.normal_equations import Products, by_run, normal_equations, project_release
+from diagnosis.likelihood.problem import Problem
+from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
 from diagnosis.model.run_data import RunData
 from diagnosis.model.similarity import Similarity
 from identification.show.numbers import reading_shown
 from tunnel_sim.effects.capabilities import OwnNumbers, Periodic
+from identification.show.quantity import Quantity
 from tunnel_sim.vocabulary.campaign import speed_groups
 from tunnel_sim.vocabulary.quantities import Seconds
 from tunnel_sim.vocabulary.record import Array
@@ -33,21 +39,51 @@ _PHASES_TRIED = (1, 720, 72)  # of each of the rival's periodic effects (none, o
 
 
 @dataclass(frozen=True)
-class NextRun:
-    """The run for which the predictions of two models differ most.
+class PlannedRun:
+    """A run to make.
 
     Args:
         spring_stiffness: Kr, N m/rad.
         wind_speed: V, m/s.
         release_angle: from the rest, rad.
         duration: of the record, s.
-        separation: expected difference of the predictions (see `separation`), in standard deviations of the noise.
     """
 
     spring_stiffness: float
     wind_speed: float
     release_angle: float
     duration: float
+
+    def own(self, similarity: Similarity) -> Self:
+        """The run in the measured campaign's units, rounded to adjustable values."""
+        return dataclasses.replace(
+            self,
+            spring_stiffness=_adjustable(similarity.own(self.spring_stiffness, "N m/rad"), 0.01),
+            wind_speed=_adjustable(self.wind_speed, 0.1),
+            release_angle=_adjustable(self.release_angle, 0.01),
+            duration=_adjustable(similarity.own(self.duration, "s"), 1.0),
+        )
+
+    def conditions(self, *, robot: bool = False) -> str:
+        """The conditions of the run, in words.
+
+        Args:
+            robot: whether the body is the joint of a machine, which has neither a spring to choose nor a wind.
+        """
+        wind = "wind off" if self.wind_speed == 0.0 else f"wind at {self.wind_speed:g} m/s"
+        rig = "" if robot else f"spring of {self.spring_stiffness:g} N m/rad, {wind}, "
+        angle = reading_shown(self.release_angle, 2)
+        return f"{rig}release at {angle}{' from the rest' if robot else ''}, duration {self.duration:g} s"
+
+
+@dataclass(frozen=True)
+class NextRun(PlannedRun):
+    """The run for which the predictions of two models differ most.
+
+    Args:
+        separation: expected difference of the predictions (see `separation`), in standard deviations of the noise.
+    """
+
     separation: float
 
     @classmethod
@@ -78,16 +114,6 @@ class NextRun:
                     found.append(cls(spring, speed, angle, duration, apart))
         return max(found, key=lambda one: one.separation, default=None)
 
-    def own(self, similarity: Similarity) -> NextRun:
-        """The run in the measured campaign's units, rounded to adjustable values."""
-        return NextRun(
-            _adjustable(similarity.own(self.spring_stiffness, "N m/rad"), 0.01),
-            _adjustable(self.wind_speed, 0.1),
-            _adjustable(self.release_angle, 0.01),
-            _adjustable(similarity.own(self.duration, "s"), 1.0),
-            self.separation,
-        )
-
     def distinguishes(self) -> bool:
         """Whether the run distinguishes its answers."""
         return self.separation >= SEPARATED_BY
@@ -99,20 +125,108 @@ class NextRun:
             f"they differ by {self.separation:.1f} standard deviations of the noise."
         )
 
-    def conditions(self, *, robot: bool = False) -> str:
-        """The conditions of the run, in words.
-
-        Args:
-            robot: whether the body is the joint of a machine, which has neither a spring to choose nor a wind.
-        """
-        wind = "wind off" if self.wind_speed == 0.0 else f"wind at {self.wind_speed:g} m/s"
-        rig = "" if robot else f"spring of {self.spring_stiffness:g} N m/rad, {wind}, "
-        angle = reading_shown(self.release_angle, 2)
-        return f"{rig}release at {angle}{' from the rest' if robot else ''}, duration {self.duration:g} s"
-
     def words(self, *, robot: bool = False) -> str:
         """The run to make, in words: arguments as in `conditions`."""
         return f"{self.conditions(robot=robot)} (the answers differ by {self.separation:.0f} standard deviations)"
+
+
+@dataclass(frozen=True)
+class FurtherRuns(PlannedRun):
+    """Equal runs that narrow a coefficient most, by their Fisher information in the model of the answer.
+
+    Args:
+        count: of the runs.
+        left: by coefficient, the standard deviation by the noise of the readings with these runs, over the present.
+    """
+
+    count: int
+    left: Mapping[str, float]
+
+    @classmethod
+    def narrowing(cls, fit: Fit, after: Mapping[str, Quantity]) -> FurtherRuns | None:
+        """The runs that narrow the widest coefficient most, as few as bring its interval to `WIDE`.
+
+        The rig can make them: springs, wind speeds and the largest angle are those of its runs.
+
+        Args:
+            after: the coefficients of the answer, in any units.
+
+        Returns:
+            None where no coefficient is wide by the noise of the readings, no stiffness is known, every run is
+            driven, or the runs differ by chance: more of them then narrow a coefficient by their number.
+        """
+        data, runs = fit.problem.data, []
+        wide = [name for name, one in after.items() if source_of_width(name, one) == "noise"]
+        if not wide or fit.problem.scatter or all(run.drive is not None for run in data.runs):
+            return None
+        # a coefficient times unstated sizes is the fit's coefficient with other units
+        names = data.model.coefficient_names(fit.problem.names)
+        own = [next((one for one in after if f"{one}_".startswith(f"{name}_")), "") for name in names]
+        widest = max(wide, key=lambda name: after[name].reach / abs(after[name].value))
+        density = max((run.air_density for run in data.runs), default=0.0) or 1.2
+        duration = max(run.duration for run in data.runs)
+        kinds = [*itertools.product(data.model.planned_springs(data), _speeds(data))]
+        for spring, speed in kinds:
+            given = planned_run(
+                fit, spring_stiffness=spring, wind_speed=speed, air_density=density, duration=duration
+            )
+            runs.append(given)
+        if not runs or widest not in own:
+            return None
+        left = remaining(fit, runs, data.swing)
+        of_widest, one = left[:, :, own.index(widest)], after[widest]
+        best = int(np.argmin(of_widest[-1]))
+        noise, now = one.shares["noise"], one.reach / abs(one.value)
+        suffices = 1.0 - noise * (1.0 - of_widest[:, best] ** 2) <= (WIDE / now) ** 2
+        few = int(np.argmax(suffices)) if suffices.any() else len(_COUNTS) - 1
+        shares = {name: float(share) for name, share in zip(own, left[few, best], strict=True) if name}
+        return cls(*kinds[best], data.swing, duration, _COUNTS[few], shares)
+
+
+WIDE: Final = 0.1
+"""Maximum reach of a 95 % interval that is not worth a step, as a share of the coefficient. Judgement."""
+
+
+def source_of_width(name: str, given: Quantity) -> str:
+    """The source of most of a coefficient's variance where its 95 % interval is wide; else empty."""
+    known = name != "moment_offset" and given.std and given.value and given.shares
+    if not known or given.reach <= WIDE * abs(given.value):
+        return ""
+    return max(given.shares, key=given.shares.__getitem__)
+
+
+_COUNTS = (2, 4, 8)  # of further runs, to choose from
+
+
+def remaining(fit: Fit, runs: list[RunData], angle: float) -> Array:
+    """Standard deviations of the coefficients by the noise with further runs, of the present ones.
+
+    Args:
+        runs: from `planned_run`.
+        angle: of the release, rad.
+
+    Returns:
+        By number of equal runs as in `_COUNTS`, run and coefficient, shape (counts, runs, coefficients); 1 where a
+        run cannot be integrated.
+    """
+    problem, own = _planned(fit, tuple(runs), angle)
+    found = sensitivities(problem, Point(fit.point.common, np.tile(own, (len(runs), 1))))
+    present, _, _ = normal_equations(
+        fit.jacobian, [np.zeros(len(common)) for common, _ in fit.jacobian], products=fit.products
+    )
+    known = Products.of(found, problem.parameters.precision)
+    added, _, _ = by_run(found, [np.zeros(len(common)) for common, _ in found], products=known)
+    added[~np.isfinite(added).all(axis=(1, 2))] = 0.0
+    scale = np.sqrt(np.maximum(np.diag(present), 1e-300))
+    gradients = coefficient_gradients(fit) / scale
+
+    def variances(matrix: Array) -> Array:
+        inverse = np.linalg.pinv(matrix / np.outer(scale, scale), rcond=1e-12, hermitian=True)
+        found: Array = np.einsum("ci,ij,cj->c", gradients, inverse, gradients)
+        return np.maximum(found, 1e-300)
+
+    after = np.array([[variances(present + count * one) for one in added] for count in _COUNTS])
+    return np.minimum(np.sqrt(after / variances(present)), 1.0)
 
 
 OTHER_INPUT = "record a run with another input, such as half the amplitude or another band of frequencies"
@@ -190,17 +304,11 @@ def _predict(fit: Fit, run: RunData, angle: float) -> _Prediction | None:
 
     The response to a periodic effect is of first order in its size, so that it rotates with its phase.
     """
-    # one instant, whatever the number in existing runs, and no deviation: it may have either sign
-    data = fit.problem.data.with_runs((run,))
-    problem = dataclasses.replace(fit.problem, data=data, instants=1, scatter=())
-    turns = np.array(
-        [issubclass(kind, Periodic) for kind in problem.effects if issubclass(kind, OwnNumbers)], bool
-    )
+    problem, own = _planned(fit, (run,), angle)
+    turns = _turning(problem)
     count = int(turns.sum())
     steps = np.array([1e-4 * angle, 1e-3 * angle])
     first = len(problem.parameters.own) - problem.parameters.of_effects
-    start = (angle, 0.0, 0.0)[:first]
-    own = np.array([*start, *np.where(turns, 0.0, 0.5)])  # samples are skipped in the middle of the run
     rows = [own, *(own + np.eye(2, own.size) * steps[:, None])]
     for turn in (0.5 * np.pi, np.pi):
         rows += list(own + turn * np.eye(own.size)[first:][turns])
@@ -212,6 +320,24 @@ def _predict(fit: Fit, run: RunData, angle: float) -> _Prediction | None:
     sine = quarter - base + cosine
     waves = np.stack([cosine, sine], axis=1).reshape(2 * count, base.size)
     return _Prediction(base - cosine.sum(axis=0), waves.T, ((values[1:3] - base) / steps[:, None]).T)
+
+
+def _planned(fit: Fit, runs: tuple[RunData, ...], angle: float) -> tuple[Problem, Array]:
+    """The problem of planned runs, and the values of a run's own parameters, shape (own,)."""
+    # one instant, whatever the number in existing runs, and no deviation: it may have either sign
+    data = fit.problem.data.with_runs(runs)
+    problem = dataclasses.replace(fit.problem, data=data, instants=1, scatter=())
+    first = len(problem.parameters.own) - problem.parameters.of_effects
+    start = (angle, 0.0, 0.0)[:first]
+    return problem, np.array(
+        [*start, *np.where(_turning(problem), 0.0, 0.5)]
+    )  # skipped in the middle of the run
+
+
+def _turning(problem: Problem) -> NDArray[np.bool_]:
+    """Of the effects with a parameter in every run, those for which it is a phase."""
+    own = [kind for kind in problem.effects if issubclass(kind, OwnNumbers)]
+    return np.array([issubclass(kind, Periodic) for kind in own], bool)
 
 
 def _missed(true: _Prediction, rival: _Prediction) -> float:

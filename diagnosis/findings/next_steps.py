@@ -9,7 +9,7 @@ from itertools import pairwise
 from diagnosis.findings.disturbed_runs import disturbed_step
 from diagnosis.findings.input_hold import hold_steps
 from diagnosis.findings.misfit import misfit_shown, windy
-from diagnosis.findings.next_run import OTHER_INPUT, NextRun
+from diagnosis.findings.next_run import OTHER_INPUT, NextRun, source_of_width
 from diagnosis.findings.next_step import NextStep
 from diagnosis.findings.patch import model_steps
 from diagnosis.findings.repeatability import width_text
@@ -125,7 +125,7 @@ def _corrects(answer: Findings) -> str:
         if two is None or not (one.determined and two.determined) or one.value * two.value <= 0.0:
             continue
         change = abs(relative_change(one.value, two.value))
-        if _VISIBLE <= change < 1.0 and abs(one.value - two.value) > reach_of(two):
+        if _VISIBLE <= change < 1.0 and abs(one.value - two.value) > two.reach:
             found.append(f"{COEFFICIENTS.get(name, name)} by {100.0 * change:.0f} %")
     return f" and corrects {listed(found)}" if found else ""
 
@@ -263,22 +263,21 @@ def _remedies(remarks: Sequence[Remark]) -> list[NextStep]:
     return [NextStep(f"{', '.join(names) or 'The campaign'}: {remedy}") for remedy, names in runs.items()]
 
 
-_WIDE = 0.1  # of a coefficient: a 95 % interval that reaches farther is worth a step
-
-
 def _narrowing(answer: Findings) -> Iterator[NextStep]:
     """For each source of a wide interval, what narrows it, and the interval that would be left."""
-    found: dict[str, list[str]] = {}
+    runs, found = answer.further_runs, dict[str, list[str]]()
     for name, one in {**answer.coefficients.after, **answer.coefficients.in_phase}.items():
-        known = name != "moment_offset" and one.std and one.value and one.shares
-        if not known or reach_of(one) <= _WIDE * abs(one.value):
-            continue
-        source = max(one.shares, key=lambda each: one.shares[each])
+        source = source_of_width(name, one)
         if source in _NARROWS:
-            left = _CUT.get(source, 1.0)
-            found.setdefault(source, []).append(_becomes(name, one, left * one.shares[source]))
+            part = _CUT.get(source, 1.0)
+            if source == "noise" and runs is not None:
+                part = 1.0 - runs.left.get(name, 1.0) ** 2
+            if part > 0.0:
+                found.setdefault(source, []).append(_becomes(name, one, part * one.shares[source]))
     for source, gains in found.items():
         what = _NARROWS[source].format(other="inputs" if answer.found.driven else "release angles")
+        if source == "noise" and runs is not None:
+            what = f"Make {runs.count} more runs: {runs.conditions(robot=answer.found.robot)}"
         yield NextStep(what, listed(gains))
 
 
@@ -307,12 +306,6 @@ _GAINS = 0.55  # of a variance: without it the standard deviation falls by a thi
 
 def _becomes(name: str, given: Quantity, part: float) -> str:
     """The interval of a coefficient without a part of its variance, such as ``Cnr becomes ± 5 % (now ± 12 %)``."""
-    now = reach_of(given) / abs(given.value)
+    now = given.reach / abs(given.value)
     left = now * math.sqrt(max(1.0 - part, 0.0))
     return f"{COEFFICIENTS.get(name, name)} becomes {within(left)} (now {within(now)})"
-
-
-def reach_of(given: Quantity) -> float:
-    """Half the width of the 95 % interval, in the coefficient's unit."""
-    low, high = given.ends
-    return 0.5 * (high - low)

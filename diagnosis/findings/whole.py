@@ -22,7 +22,7 @@ from diagnosis.findings.hidden import Hidden
 from diagnosis.findings.input_hold import OtherHold
 from diagnosis.findings.judged import Misfit
 from diagnosis.findings.judgements import Nearly
-from diagnosis.findings.next_run import NextRun
+from diagnosis.findings.next_run import FurtherRuns, NextRun
 from diagnosis.findings.other_motions import TwoModes
 from diagnosis.findings.place import place_pictures
 from diagnosis.findings.remainder import Remainder, law_pictures
@@ -48,9 +48,9 @@ from tunnel_sim.vocabulary.errors import TunnelError, one_line
 
 SCHEMA_VERSION = 1
 _LAST = (
-    "sizes", "rest", "model", "closable", "ambiguous_with", "next_run", "coefficients", "confirmation", "noise",
-    "hidden", "trade_off", "blind_spots", "cautions", "repeatability", "disturbed", "remarks", "found", "seconds",
-    "maps", "provenance",
+    "sizes", "rest", "model", "closable", "ambiguous_with", "next_run", "further_runs", "coefficients",
+    "confirmation", "noise", "hidden", "trade_off", "blind_spots", "cautions", "repeatability", "disturbed",
+    "remarks", "found", "seconds", "maps", "provenance",
 )  # fmt: skip
 
 
@@ -105,6 +105,7 @@ class Findings:
         candidates: the answers considered, the answer first, ``none`` and ``unknown`` among them.
         ambiguous_with: effects that these runs cannot distinguish from the causes.
         next_run: the run expected to distinguish them; None where not needed.
+        further_runs: that narrow the widest coefficient; None where none is wide by the noise of the readings.
         confirmation: whether the fits' integrator agrees with the MuJoCo model, from which the gap is computed.
         hidden: the effects that could hide, ordered by their move of a coefficient against its standard deviation.
         trade_off: the two parameters of the answer that the runs separate least; None where they separate all.
@@ -155,6 +156,7 @@ class Findings:
     found: Found = field(default_factory=Found)
     friction: FrictionCurve | None = None
     costs: WhatItCosts | None = None
+    further_runs: FurtherRuns | None = None
     data: Annotated[Campaign | None, UNWRITTEN] = field(default=None, compare=False)
 
     @property

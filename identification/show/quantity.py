@@ -63,6 +63,12 @@ class Quantity(AsNumber):
         return self.interval or (self.value - reach, self.value + reach)
 
     @property
+    def reach(self) -> float:
+        """Half the width of the 95 % interval, in ``unit``."""
+        low, high = self.ends
+        return 0.5 * (high - low)
+
+    @property
     def known_std(self) -> float:
         """The standard deviation that every quantity of an `Estimate` has, in ``unit``.
 

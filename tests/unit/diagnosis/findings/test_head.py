@@ -135,6 +135,12 @@ def test_a_wide_interval_has_a_step_that_narrows_it(source: str, step: str, left
     (found,) = (one for one in next_steps(findings_of(given)) if one.startswith(step))
     now = 196.0 * 0.03 / 0.152
     assert_shows(found.partition(": Cnr becomes ")[2].replace("0.01", "0"), [left * now, now])
+    if source == "noise":
+        runs = {"spring_stiffness": 16.12, "wind_speed": 35.0, "release_angle": 0.35, "duration": 10.0}
+        given["further_runs"] = runs | {"count": 2, "left": {"cn_r": 0.3}}
+        (found,) = (one for one in next_steps(findings_of(given)) if "becomes" in one)
+        assert found.startswith("Make 2 more runs: spring of 16.12 N m/rad, wind at 35 m/s, release at 20°")
+        assert_shows(found.partition(": Cnr becomes ")[2], [0.3 * now, now])
     wide["std"] = 0.003
     assert not any(one.startswith(step) for one in next_steps(findings_of(given)))
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.findings.next_run import NextRun, planned_run, separation
+from diagnosis.findings.next_run import FurtherRuns, NextRun, planned_run, separation
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.normal_equations import normal_equations
 from diagnosis.likelihood.problem import Problem
@@ -13,6 +13,7 @@ from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.parameters import Point
 from diagnosis.search.investigate import nominal_study
+from identification.show.quantity import Quantity
 from tests.support.driven_runs import driven
 from tests.support.gap_campaigns import campaign, nominal
 from tunnel_sim.effects import effect_class, effect_from
@@ -151,3 +152,26 @@ def test_a_free_decay_is_not_proposed_where_it_does_not_show_the_question(rivals
     assert NextRun.between(base, base) is None
     late = replace(rivals[1].problem, effects=(effect_class("input_delay"),))
     assert NextRun.between(rivals[0], replace(rivals[1], problem=late)) is None
+
+
+def test_further_runs_narrow_a_coefficient_as_predicted():
+    """Truth: the fit of the campaign with these runs, simulated with noise."""
+    short = {"duration": 3.0, "conditions": ((16.12, 0.0), (44.84, 0.0), (44.84, 15.0))}
+    base = nominal(campaign(**short))
+    std = {name: base.std(name) for name in ("cn_beta", "cn_r")}
+    after = {name: Quantity(base.value(name), std[name], "1/rad", shares={"noise": 1.0}) for name in std}
+    wide = after | {"cn_r": replace(after["cn_r"], value=5.0 * std["cn_r"])}
+    runs = FurtherRuns.narrowing(base, wide)
+    assert runs is not None
+    assert runs.wind_speed == 15.0
+    assert (
+        FurtherRuns.narrowing(
+            base, {name: replace(one, value=100.0 * one.std) for name, one in after.items()}
+        )
+        is None
+    )
+    more = ((runs.spring_stiffness, runs.wind_speed),) * runs.count
+    together = nominal(campaign(**short | {"conditions": short["conditions"] + more}))
+    for name, before in std.items():
+        assert runs.left[name] == pytest.approx(together.std(name) / before, rel=0.25)
+    assert runs.left["cn_r"] < 0.8
