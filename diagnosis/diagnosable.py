@@ -22,14 +22,13 @@ from identification.estimate import Status
 from identification.examination.examine import examine, with_clocks
 from identification.examination.self_excited import in_limit_cycle
 from identification.show.numbers import unit_mark
-from identification.signal.known_gain import refuse_other_gain
+from identification.signal.known_gain import refuse_other_gains
 from identification.signal.run_fit import NO_WINDOWS, identify_run
 from identification.status import Outcome, Remark
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.capabilities import SecondOscillation
 from tunnel_sim.effects.drives import ActuatorEffect
 from tunnel_sim.vocabulary.campaign import Campaign, Run, speed_groups
-from tunnel_sim.vocabulary.drive import refuse_several_gains, refuse_untreated
 from tunnel_sim.vocabulary.errors import TunnelError, counted
 
 OTHER_MODE: Final = 1.5
@@ -244,12 +243,8 @@ def refuse_undiagnosable(campaign: Campaign, given: NominalModel | None = None) 
     Raises:
         TunnelError: for the first such run.
     """
-    driven = [run for run in campaign.runs if run.drive is not None]
-    for run in driven:
-        assert run.drive is not None
+    for run in campaign.checked_inputs().driven_runs:
         where = f"{campaign.name}, run '{run.id}'"
-        quantity = campaign.sensor.quantity or "angle"
-        refuse_untreated(run.drive, run.spring_stiffness, quantity, where, wind_on=run.wind_on)
         if run.spring_stiffness == 0.0 and run.wind_on:
             what = "driven runs without a spring are not diagnosed with the wind on"
             raise TunnelError(what, where=where, remedy="leave the run out")
@@ -260,9 +255,7 @@ def refuse_undiagnosable(campaign: Campaign, given: NominalModel | None = None) 
                 where=where,
                 remedy=f"record {LEAST_SAMPLES} samples or more, or leave the run out",
             )
-        judged = campaign.sensor.plausible is not False
-        refuse_other_gain(run, campaign.sensor.derivative, where, judged=judged)
-    refuse_several_gains([run.drive for run in driven], campaign.name)
+    refuse_other_gains(campaign)
     loose = [run for run in campaign.runs if run.unrestrained]
     if loose and not campaign.unrestrained:
         raise TunnelError(
@@ -281,19 +274,15 @@ def refuse_motionless(campaign: Campaign, model: NominalModel) -> None:
         TunnelError: for the first run without a decaying motion, or the first driven one whose motion does not
             follow from its input, as an oscillation where there is a spring.
     """
-    for run in campaign.runs:
-        if run.drive is not None:
-            continue
+    for run in campaign.decays:
         status = _motion(run, campaign)
         if status in _NOT_DIAGNOSABLE:
             what, _, remedy = status.value.partition(": ")
             raise TunnelError(what, where=f"run {run.id}", remedy=f"{remedy}; or leave the run out")
-    for run in campaign.runs:
-        if run.drive is None:
-            continue
+    known = model.resonance_known
+    for run, drive in zip(campaign.driven_runs, campaign.inputs, strict=True):
         found = response_to_input(run, campaign.sensor.derivative)
-        known = model.resonance_known
-        if known and (found is None or not found[2] * (run.input_gain or run.drive.kind.scale) > 0.0):
+        if known and (found is None or not found[2] * (run.input_gain or drive.kind.scale) > 0.0):
             raise TunnelError(
                 "the motion does not follow the moment of the input",
                 where=f"run {run.id}",
@@ -317,7 +306,7 @@ def kinds_for(
     """
     if not campaign.driven:
         return tuple(kind for kind in kinds if not kind.driven), ()
-    moments = any(run.drive is not None and run.drive.kind.by_actuator for run in campaign.runs)
+    moments = any(drive.kind.by_actuator for drive in campaign.inputs)
     kept = tuple(kind for kind in kinds if moments or not issubclass(kind, ActuatorEffect))
     gone = untried_by_inputs(campaign, kept)
     kept = tuple(kind for kind in kept if not any(kind in some for some in gone.values()))
@@ -334,7 +323,7 @@ def gain_words(campaign: Campaign, fit: Fit) -> tuple[str, ...]:
         return (said,)
     if "drive_gain" not in fit.problem.names:
         return ()
-    fitted = [r.drive for r in campaign.runs if r.drive is not None and data.model.fits_gain(r.drive)]
+    fitted = [drive for drive in campaign.inputs if data.model.fits_gain(drive)]
     known = any(drive.gain_stated for drive in fitted)
     unit = "kg m2" if known else "N m"
     value, std = fit.value("drive_gain"), fit.std("drive_gain")

@@ -20,14 +20,13 @@ from identification.examination.examine import as_angles, examine
 from identification.examination.self_excited import in_limit_cycle
 from identification.progress import Progress, shown_by
 from identification.returned import checked_return
-from identification.signal.known_gain import refuse_other_gain
+from identification.signal.known_gain import refuse_other_gains
 from identification.statistics import widened_by_contradictions, widened_by_rounding, withheld
 from identification.status import Outcome, Remark, left_out_as_asked
 from identification.trade_off import of_coefficients
 from tunnel_sim.files.as_campaign import as_campaign
 from tunnel_sim.processes import one_blas_thread
 from tunnel_sim.vocabulary.campaign import Campaign
-from tunnel_sim.vocabulary.drive import checked_drive, refuse_several_gains, refuse_untreated
 from tunnel_sim.vocabulary.errors import TunnelError
 
 
@@ -67,23 +66,13 @@ def identify(
     chosen = make_estimator(estimator) if isinstance(estimator, str) else estimator
     if not campaign.runs:
         raise TunnelError("campaign without runs", where=campaign.name, remedy="add at least one run")
-    # driven runs are refused if the estimator would mistake them for free decays
-    for run in campaign.runs:
-        if run.drive is None:
-            continue
-        where = f"{campaign.name}, run '{run.id}'"
-        if not takes_driven(chosen):
-            remedy = f"use {' or '.join(estimators_of_driven_runs())}, or leave the driven runs out"
-            if chosen.name not in SUMMARIES:
-                remedy += "; a class that uses their inputs states takes_driven = True"
-            what = f"the run is driven, and {chosen.name} takes free decays only"
-            raise TunnelError(what, where=where, remedy=remedy)
-        checked_drive(run.drive, run.record, where, judged=campaign.sensor.plausible is not False)
-        quantity = campaign.sensor.quantity or "angle"
-        refuse_untreated(run.drive, run.spring_stiffness, quantity, where, wind_on=run.wind_on)
-        judged = campaign.sensor.plausible is not False
-        refuse_other_gain(run, campaign.sensor.derivative, where, judged=judged)
-    refuse_several_gains([run.drive for run in campaign.runs], campaign.name)
+    if campaign.driven and not takes_driven(chosen):  # it would mistake them for free decays
+        remedy = f"use {' or '.join(estimators_of_driven_runs())}, or leave the driven runs out"
+        if chosen.name not in SUMMARIES:
+            remedy += "; a class that uses their inputs states takes_driven = True"
+        what = f"the run is driven, and {chosen.name} takes free decays only"
+        raise TunnelError(what, where=f"{campaign.name}, run '{campaign.driven_runs[0].id}'", remedy=remedy)
+    refuse_other_gains(campaign.checked_inputs())
     examined = examine(campaign).accepted()
     remaining = examined.campaign
     # The rate of a decay is not to be had from these, and the filter does not need one.

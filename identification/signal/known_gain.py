@@ -8,7 +8,8 @@ from identification.policy import REFUSAL_DEVIATIONS
 from identification.signal.decay_fit import Reading, fit_decays
 from identification.signal.forcing import driven_start
 from identification.statistics import determined, inverse
-from tunnel_sim.vocabulary.campaign import Run
+from tunnel_sim.vocabulary.campaign import Campaign, Run
+from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import evenly_spaced
 
@@ -16,27 +17,29 @@ _DEGREES = 180.0 / np.pi
 _SAME_GAIN = 0.5  # greatest relative error of a start's gain: errors of sign and unit are far larger
 
 
-def refuse_other_gain(run: Run, derivative: int, where: str, *, judged: bool = True) -> None:
+def refuse_other_gains(campaign: Campaign) -> None:
     """Refuse the acceleration of a base whose sign or unit the motion contradicts.
 
     Its gain over the inertia is known. The input is refused where the motion shows another gain beyond doubt: of
-    opposite sign, or in degrees instead of radians.
-
-    Args:
-        derivative: 0 where the readings are angles, 1 where they are rates.
-        judged: whether a probable error of units is refused too.
+    opposite sign, or in degrees instead of radians (where the sensor's values must be plausible).
 
     Raises:
-        TunnelError: for such an input.
+        TunnelError: for the first such input.
     """
-    if run.drive is None or not run.drive.kind.by_inertia:
-        return
-    record, column = evenly_spaced(run.record), run.drive.column
-    values = np.interp(record.time_s, run.record.time_s, run.drive.values)
+    sensor = campaign.sensor
+    for run in campaign.runs:
+        if run.drive is not None and run.drive.kind.by_inertia:
+            where = f"{campaign.name}, run '{run.id}'"
+            _refuse_other_gain(run, run.drive, sensor.derivative, where, judged=sensor.plausible is not False)
+
+
+def _refuse_other_gain(run: Run, drive: Drive, derivative: int, where: str, *, judged: bool) -> None:
+    record, column = evenly_spaced(run.record), drive.column
+    values = np.interp(record.time_s, run.record.time_s, drive.values)
     start = driven_start(record.time_s, record.yaw_rad, values, derivative=derivative)
     if start is None or not start[1] > 0.0:  # other checks refuse a motion that does not oscillate
         return
-    ratio = start[2] / run.drive.kind.scale
+    ratio = start[2] / drive.kind.scale
     turned, degrees, radians = (
         abs(ratio * factor - 1.0) < _SAME_GAIN for factor in (-1.0, _DEGREES, 1.0 / _DEGREES)
     )

@@ -337,6 +337,7 @@ IN_WIND = {"wind_speed": 3.0, "air_density": 1.2}
         ),
         ("loose", beside("loose", drive={"column": "drive"}), (diagnose,), "when the gain is unknown"),
         ("loose", scaled(-1.0), (diagnose,), "does not follow the moment"),
+        ("moment", scaled(0.0), (identify, refuse_undiagnosable), "is constant"),
         ("turning base", alone(without_springs), (identify, refuse_undiagnosable), "without a spring"),
         ("turning base", alone(of_first(**IN_WIND)), (identify, refuse_undiagnosable), "with the wind on"),
         ("turning base", scaled(-1.0), (identify, refuse_undiagnosable), "the other sign"),

@@ -8,7 +8,7 @@ from statistics import fmean
 from typing import TYPE_CHECKING, Literal
 
 from tunnel_sim.vocabulary.between_runs import Repeatability as Repeatability
-from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.drive import Drive, checked_drive, refuse_several_gains, refuse_untreated
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, installing
 from tunnel_sim.vocabulary.inputs import KnownGain
 from tunnel_sim.vocabulary.plan import SensorModel
@@ -211,9 +211,40 @@ class Campaign:
     repeatability: Repeatability | None = None
 
     @property
+    def inputs(self) -> tuple[Drive, ...]:
+        """The inputs of the driven runs."""
+        return tuple(run.drive for run in self.runs if run.drive is not None)
+
+    @property
     def driven(self) -> bool:
         """Whether any run has an input."""
-        return any(run.drive is not None for run in self.runs)
+        return bool(self.inputs)
+
+    @property
+    def driven_runs(self) -> tuple[Run, ...]:
+        """The runs with an input."""
+        return tuple(run for run in self.runs if run.drive is not None)
+
+    @property
+    def decays(self) -> tuple[Run, ...]:
+        """The free decays: the runs without an input."""
+        return tuple(run for run in self.runs if run.drive is None)
+
+    def checked_inputs(self) -> Campaign:
+        """The campaign, whose driven runs can be identified.
+
+        Raises:
+            TunnelError: for the first input that cannot belong to its record or with which no run can be
+                identified, and for unknown gains of several inputs.
+        """
+        quantity, judged = self.sensor.quantity or "angle", self.sensor.plausible is not False
+        for run in self.runs:
+            if run.drive is not None:
+                where = f"{self.name}, run '{run.id}'"
+                checked_drive(run.drive, run.record, where, judged=judged)
+                refuse_untreated(run.drive, run.spring_stiffness, quantity, where, wind_on=run.wind_on)
+        refuse_several_gains(self.inputs, self.name)
+        return self
 
     @property
     def unrestrained(self) -> bool:
@@ -246,7 +277,7 @@ class Campaign:
         count = f"{len(self.runs)} run{'' if len(self.runs) == 1 else 's'}"
         on = sum(run.wind_on for run in self.runs)
         springs = [run.spring_stiffness for run in self.runs if run.spring_stiffness is not None]
-        driven = sum(run.drive is not None for run in self.runs)
+        driven = len(self.inputs)
         stated = [
             *([f"{driven} driven"] if driven else []),
             f"springs {_between(springs)} N m/rad" if springs else "no spring stated",

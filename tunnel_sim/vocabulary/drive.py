@@ -162,11 +162,9 @@ def refuse_untreated(
         raise TunnelError(what, where=where, remedy=remedy)
 
 
-def refuse_several_gains(drives: Iterable[Drive | None], where: str) -> None:
+def refuse_several_gains(drives: Iterable[Drive], where: str) -> None:
     """Refuse inputs of several columns whose gains are unknown: one gain is fitted, common to the runs."""
-    columns = sorted(
-        {one.column for one in drives if one is not None and one.kind.takes_gain and one.gain is None}
-    )
+    columns = sorted({one.column for one in drives if one.kind.takes_gain and one.gain is None})
     if len(columns) > 1:
         raise TunnelError(
             f"the gains of {' and '.join(columns)} are unknown, but the fit has one common gain",
