@@ -116,14 +116,13 @@ class _OfLaw(NominalModel):
             TunnelError: for the first such run.
         """
         if campaign.driven and campaign.sensor.derivative:
-            (run, *_) = (run for run in campaign.runs if run.drive is not None)
             raise TunnelError(
                 "the run is driven and its sensor reads rates, which do not determine the position of the model's "
                 "joint",
-                where=f"{campaign.name}, run '{run.id}'",
+                where=f"{campaign.name}, run '{campaign.driven_runs[0].id}'",
                 remedy="record the angle, or leave --model out",
             )
-        free = [run.id for run in campaign.runs if run.drive is None]
+        free = [run.id for run in campaign.decays]
         if self.law.stiffness == 0.0 and free:
             raise TunnelError(
                 f"the joint of the model has no restoring moment, and {', '.join(free)} have no input",
@@ -300,7 +299,7 @@ def recorded(campaign: Campaign, actuator: str | None = None) -> Recorded:
     from tunnel_sim.engine.joint_model import Recorded  # only here: MuJoCo is slow to load
 
     by_control = ("drive", "command_rad")
-    controlled = any(run.drive is not None and run.drive.column in by_control for run in campaign.runs)
+    controlled = any(drive.column in by_control for drive in campaign.inputs)
     if not campaign.driven or campaign.sensor.derivative:  # driven runs of rates are refused later
         return Recorded(reach(campaign), 0.0 if campaign.driven else None, controlled, actuator)
     means = [np.nanmean(run.record.yaw_rad) for run in campaign.runs]

@@ -90,7 +90,7 @@ class NominalModel:
             windy=any(run.wind_on for run in campaign.runs),
             mean_speed=mean_wind_speed((run.wind_speed for run in campaign.runs), REFERENCE_SPEED),
             own_zeros=campaign.sensor.zero == "per_run" and self.restored and "zero" not in self.held,
-            unknown_gain=any(run.drive is not None and self.fits_gain(run.drive) for run in campaign.runs),
+            unknown_gain=any(map(self.fits_gain, campaign.inputs)),
         )
 
     def among(self, runs: Sequence[RunData]) -> NominalModel:

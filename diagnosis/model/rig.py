@@ -131,7 +131,7 @@ class PerInertia(SpringModel):
         Raises:
             TunnelError: for the campaign.
         """
-        fitted = [run.drive for run in campaign.runs if run.drive is not None and self.fits_gain(run.drive)]
+        fitted = [drive for drive in campaign.inputs if self.fits_gain(drive)]
         mixed = {drive.gain_stated for drive in fitted}
         if len(mixed) > 1:
             raise TunnelError(

@@ -57,8 +57,8 @@ class _OfServo(NominalModel):
 
     def of(self, campaign: Campaign) -> NominalModel:
         """With the kv that the runs state."""
-        stated = {0.0 if run.drive is None else run.drive.servo_kv or 0.0 for run in campaign.runs}
-        return replace(super().of(campaign), kv=min(stated))  # type: ignore[call-arg]  # refuse: they are one
+        stated = min((drive.servo_kv or 0.0 for drive in campaign.inputs), default=0.0)
+        return replace(super().of(campaign), kv=stated)  # type: ignore[call-arg]  # refuse: they are one
 
     def refuse(self, campaign: Campaign) -> None:
         """Refuse runs without the servo, and servos of several gains.
@@ -166,7 +166,7 @@ class ServoPerInertia(_OfServo, PerInertia):
             TunnelError: for the first such run.
         """
         super().refuse(campaign)
-        if any(run.drive is not None and run.drive.servo_kv for run in campaign.runs):
+        if any(drive.servo_kv for drive in campaign.inputs):
             what = "servo_kv is stated without kp; moments are then known per unit inertia only"
             remedy = "state the kp as spring_stiffness, or leave servo_kv out"
             raise TunnelError(what, where=campaign.name, remedy=remedy)

@@ -22,7 +22,7 @@ def untried_by_inputs(campaign: Campaign, kinds: Sequence[type[Effect]]) -> dict
     Returns:
         By a sentence with a place for their names, those of ``kinds`` that are not tried; none where all follow.
     """
-    inputs = {run.drive.kind for run in campaign.runs if run.drive is not None}
+    inputs = {drive.kind for drive in campaign.inputs}
     found: dict[str, list[type[Effect]]] = {}
     if any(one.of_spring for one in inputs):
         found[_MOVING_ROOT] = [kind for kind in kinds if kind.on_spring and kind.channel == "damping"]
