@@ -201,7 +201,7 @@ class RunDeviations:
         found = marginal(self.products, middle).deviations
         spreads = []
         for k, one in enumerate(scatter):
-            acts = [one.kind.acts(wind_on=run.wind_on) for run in data.runs]
+            acts = data.acts(one.kind)
             own = {run.id: float(e) for run, e, a in zip(data.runs, found[:, k], acts, strict=True) if a}
             known, interval = data.repeatability.get(one.kind.scatters), (float(low[k]), float(high[k]))
             spreads.append(Spread(one.name, float(middle[k]), interval, known, one.shown, own))
@@ -248,8 +248,8 @@ class RunDeviations:
 
     def _patterns(self, place: int) -> dict[str, PerRun | None]:
         """Quantities that the deviations of one parameter may follow, from -1/2 to 1/2; None for the order."""
-        runs, kind = self.fitted.problem.data.runs, self.scatter[place].kind
-        acts = np.array([kind.acts(wind_on=run.wind_on) for run in runs])
+        data = self.fitted.problem.data
+        runs, acts = data.runs, data.acts(self.scatter[place].kind)
         known = {
             "spring_stiffness": [run.spring_stiffness or 0.0 for run in runs],
             "wind_speed": [run.wind_speed for run in runs],
@@ -269,8 +269,8 @@ class RunDeviations:
 
     def _trend(self, place: int, along: str, values: PerRun | None, tried: int) -> Trend | None:
         """The drift of one parameter; None where too few runs have it."""
-        runs, kind = self.fitted.problem.data.runs, self.scatter[place].kind
-        count = sum(kind.acts(wind_on=run.wind_on) for run in runs)
+        kind = self.scatter[place].kind
+        count = int(self.fitted.problem.data.acts(kind).sum())
         if count < (_FEWEST if values is None else _FEWEST_OF_PATTERN):
             return None
         columns, size = self.columns.with_drift(place, values)

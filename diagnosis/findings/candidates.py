@@ -225,10 +225,8 @@ def candidates(study: Study, base: Base, errors: Mapping[str, float] = {}) -> tu
 
 def _scatter(study: Study) -> set[str]:
     """The chance differences that the runs may have: all that an answer without effects explains a gap by."""
-    windy = any(run.wind_on for run in study.campaign.runs)
-    return {
-        kind.name for kind in known_effects() if issubclass(kind, BetweenRuns) and kind.acts(wind_on=windy)
-    }
+    data = study.nominal.problem.data
+    return {kind.name for kind in known_effects() if issubclass(kind, BetweenRuns) and data.may_show(kind)}
 
 
 def inclusion(answers: Sequence[Candidate], read_off: Sequence[str], chosen: GapSettings) -> dict[str, float]:
@@ -330,9 +328,9 @@ def cause_sizes(study: Study) -> tuple[CauseSize, ...]:
     sizes = []
     for kind, effect in zip(problem.effects, problem.effects_at(fit.point.common), strict=True):
         severity = f"{kind.name}.{kind.parameters()[0].name}"
-        if kind.driven or severity not in problem.names:
+        if not data.may_show(kind) or severity not in problem.names:
             continue
-        acts = [i for i, run in enumerate(data.runs) if kind.acts(wind_on=run.wind_on)]
+        acts = np.flatnonzero(data.acts(kind)).tolist()
         release, without = fit.point.per_run.copy(), fit.point.common.copy()
         release[:, :2] = amplitude, 0.0
         without[problem.names.index(severity)] = 0.0

@@ -87,18 +87,13 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
     One per trial; none where the runs cannot show the effect.
     """
     data = base.problem.data
-    if not _may_show(data, kind):
+    if not data.may_show(kind):
         return []
     if issubclass(kind, OwnNumbers):
         tried = (_with_own_numbers(base, kind, one) for one in kind.sought(ResidualsOf(base)) if one)
     else:
         tried = (_by_linear_theory(base, kind, trial) for trial in kind.trials(_circumstances(base)))
     return sorted(filter(None, tried), key=lambda start: -start.predicted_drop)
-
-
-def _may_show(data: Data, kind: type[Effect]) -> bool:
-    """Whether the runs have the wind or the input that an effect needs."""
-    return kind.acts(wind_on=data.wind_on) and (not kind.driven or data.driven)
 
 
 def _with_own_numbers(base: Fit, kind: type[OwnNumbers], one: Sought) -> StartingPoint | None:
@@ -166,7 +161,7 @@ def changes(base: Fit, kind: type[Effect]) -> Iterator[list[Array]]:
         Changes of the scaled prediction, by run, shape (n,); none where the runs cannot show the effect.
     """
     data = base.problem.data
-    if not _may_show(data, kind) or issubclass(kind, OwnNumbers):
+    if not data.may_show(kind) or issubclass(kind, OwnNumbers):
         return
     for trial in kind.trials(_circumstances(base)):
         tried = _moderate(base, kind, trial)
@@ -275,7 +270,7 @@ def second_order_starts(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
     Empty for other effects, and where the runs cannot show it.
     """
     found: list[StartingPoint] = []
-    if not kind.acts(wind_on=base.problem.data.wind_on):
+    if not base.problem.data.may_show(kind):
         return found
     for trial in kind.trials(_circumstances(base)):
         if trial.second_order and trial.passive and trial.scaled is not None:
@@ -389,7 +384,7 @@ def unabsorbed(base: Fit, kind: type[Effect]) -> tuple[Array, float] | None:
         runs cannot show the effect.
     """
     trial = next(iter(kind.trials(_circumstances(base))), None)
-    if trial is None or not kind.acts(wind_on=base.problem.data.wind_on):
+    if trial is None or not base.problem.data.may_show(kind):
         return None
     effects = (*base.problem.effects, kind)
     form = next(iter(kind.forms()), ())

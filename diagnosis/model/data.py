@@ -6,10 +6,14 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+from numpy.typing import NDArray
+
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.run_data import PreparedRuns, RunData
 from diagnosis.model.similarity import AS_MEASURED, Similarity
 from diagnosis.settings import Settings
+from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.campaign import speed_groups
 
 FOLDS = 3  # groups of runs left out in turn
@@ -35,6 +39,14 @@ class Data(PreparedRuns):
     def wind_on(self) -> bool:
         """Whether any run of the campaign has the wind on."""
         return self.model.windy
+
+    def acts(self, kind: type[Effect]) -> NDArray[np.bool_]:
+        """The runs in which an effect acts, shape (runs,)."""
+        return np.array([kind.acts(wind_on=run.wind_on) for run in self.runs], np.bool_)
+
+    def may_show(self, kind: type[Effect]) -> bool:
+        """Whether the campaign has the wind or the input that an effect needs."""
+        return kind.acts(wind_on=self.wind_on) and (self.driven or not kind.driven)
 
     def with_runs(self, runs: tuple[RunData, ...]) -> Data:
         """Other runs of the same campaign, whose model has the same parameters."""

@@ -42,10 +42,7 @@ def may_scatter(kinds: Sequence[type[Effect]], data: Data) -> tuple[type[Between
     if not data.model.restored:
         return ()
     return tuple(
-        kind
-        for kind in kinds
-        if issubclass(kind, BetweenRuns)
-        and sum(kind.acts(wind_on=run.wind_on) for run in data.runs) >= _FEWEST
+        kind for kind in kinds if issubclass(kind, BetweenRuns) and data.acts(kind).sum() >= _FEWEST
     )
 
 
