@@ -235,14 +235,14 @@ def _caveats(
 
 def _beside(study: Study, chosen: Chosen, named: _Named, caveats: tuple[Fact, ...]) -> Found:
     """The facts of an answer that are not numbers of it."""
-    runs, noise = study.nominal.problem.data.runs, study.prepared.noise
+    data, noise = study.nominal.problem.data, study.prepared.noise
     unknown = named.unsure and _unknown(named.candidates)
     return Found(
         place=named.place if isinstance(named.place, PlaceFound) else None,
         nowhere=named.place if isinstance(named.place, Nowhere) else None,
-        both_winds=len({run.wind_on for run in runs}) > 1,
-        robot=study.model.of_robot and not any(run.wind_on for run in runs),
-        driven=all(run.drive is not None for run in runs),
+        both_winds=bool(data.in_wind and data.in_still_air),
+        robot=study.model.of_robot and not data.in_wind,
+        driven=not data.decays,
         nearly=nearly(study),
         immaterial=named.immaterial,
         choices=spring_choices(study),

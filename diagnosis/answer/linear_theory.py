@@ -50,13 +50,11 @@ def wind_on_runs(fit: Fit) -> list[WindOnRun]:
     data = fit.problem.data
     found = []
     for i, run in enumerate(data.runs):
-        if not run.wind_on:
-            continue
         inertia, _, stiffness = linear_coefficients(fit, i)
         spring = fit.problem.stated(fit.point.common, fit.point.per_run[i], run).spring_stiffness
-        if stiffness <= 0.0 or spring <= 0.0:
-            continue
         load = 0.5 * run.air_density * run.wind_speed * data.frontal_area * data.reference_length**2
+        if stiffness <= 0.0 or spring <= 0.0 or load <= 0.0:
+            continue
         omega, still = math.sqrt(stiffness / inertia), math.sqrt(spring / inertia)
         pressure = load * run.wind_speed / data.reference_length
         found.append(WindOnRun(spring, omega, still, pressure, load))
@@ -346,12 +344,12 @@ def _step(
 
 def _scatter(fit: Fit, influence: list[Array], residuals: list[Array]) -> Array:
     """Standard deviations from the scatter of the runs; 0 where chance explains the residual."""
-    names, runs = coefficients_of(fit), fit.problem.data.runs
+    names, data = coefficients_of(fit), fit.problem.data
     excess = sum(float(residual @ residual) for residual in residuals) - fit.count
     if excess <= SCATTER_STDS * math.sqrt(2.0 * fit.count):
         return np.zeros(len(names))
-    windy = sum(run.wind_on for run in runs)
-    informative_runs = np.array([windy if name.startswith("cn_") else len(runs) for name in names])
+    informative = [data.in_wind if name.startswith("cn_") else data.runs for name in names]
+    informative_runs = np.array([len(runs) for runs in informative])
     parts = [residual @ own for residual, own in zip(residuals, influence, strict=True)]
     return scatter_of_runs(np.array(parts), informative_runs)
 

@@ -161,9 +161,8 @@ def meant_coefficient(estimate: Quantity, fit: Fit, name: str) -> Quantity:
         return estimate
     data, greatest = fit.problem.data, math.inf
     for index, run in enumerate(data.runs):
-        if run.wind_on:
+        if pressure := data.air_moment(run):
             inertia, _, stiffness = linear_coefficients(fit, index)
-            pressure = data.air_moment(run)
             if name == "cn_beta":
                 own = abs(stiffness) / pressure
             else:
@@ -292,7 +291,7 @@ def _parameters(
             relative = float(np.sqrt(0.5 / independent))
             if part.strouhal_number > 0.0:
                 size = float(np.sqrt(2.0)) * intensity
-                speeds = [run.wind_speed for run in data.runs if run.wind_on]
+                speeds = [run.wind_speed for run in data.in_wind]
                 reduced = float(np.sqrt(np.mean(np.square(speeds)))) / data.width  # Hz
                 estimates[severity] = Quantity(size, size * relative, "1")
                 estimates[place] = Quantity(part.strouhal_number, part.bandwidth / reduced * relative, "1")

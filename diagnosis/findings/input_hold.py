@@ -46,7 +46,7 @@ def other_hold(study: Study) -> OtherHold | None:
     from scipy.special import chdtri  # only here: slow to load
 
     fit, problem = study.chosen, study.chosen.problem
-    inputs = {run.drive.held for run in problem.data.runs if run.drive is not None}
+    inputs = {drive.held for drive in problem.data.inputs}
     if DELAY.name not in study.causes or DELAY not in problem.effects or len(inputs) != 1:
         return None
     (held,) = inputs
@@ -66,13 +66,12 @@ def other_hold(study: Study) -> OtherHold | None:
     if fitted.unlikelihood - fit.unlikelihood > chance:
         return None
     delay, own = f"{DELAY.name}.{DELAY.parameters()[0].name}", study.similarity.own
-    driven = (run for run in study.campaign.runs if run.drive is not None)
-    half = 0.5 * float(np.median([run.record.sample_interval for run in driven]))
+    half = 0.5 * float(np.median([run.record.sample_interval for run in study.campaign.driven_runs]))
     return OtherHold(
         delay_s=own(fit.value(delay), "s"),
         half_sample_s=own(half, "s"),
         taken="zero" if held else "linear",
-        stated=all(run.drive is None or run.drive.hold is not None for run in study.campaign.runs),
+        stated=all(drive.hold is not None for drive in study.campaign.inputs),
         better=bool(fit.unlikelihood - fitted.unlikelihood > chance),
     )
 

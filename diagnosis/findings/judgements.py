@@ -113,7 +113,7 @@ def cautions(
         figures = {"rms_rad": confirmation.rms_difference, "tolerance_rad": confirmation.tolerance}
         beside = {"run": confirmation.run, "tolerance": INTEGRATOR_TOLERANCE}
         facts.append(Fact("not confirmed", figures | beside))
-    windy = any(run.wind_on for run in campaign.runs)
+    windy = bool(campaign.in_wind)
     if len(campaign.runs) < RUNS_WITHOUT_CAUTION:
         kind = {"driven": campaign.driven, "windy": windy}
         facts.append(Fact("few runs", {"runs": len(campaign.runs), **kind}))

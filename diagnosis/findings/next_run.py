@@ -98,7 +98,7 @@ class NextRun(PlannedRun):
         """
         data = first.problem.data
         differ = set(first.problem.effects) ^ set(second.problem.effects)
-        if all(run.drive is not None for run in data.runs) or any(kind.driven for kind in differ):
+        if not data.decays or any(kind.driven for kind in differ):
             return None
         density = max((run.air_density for run in data.runs), default=0.0) or 1.2
         found = []

@@ -83,8 +83,8 @@ def second_modes(campaign: Campaign) -> tuple[TwoModes, ...]:
         out.
     """
     modes = []
-    for run in campaign.runs:
-        frequency = starting_frequency(run.record) if run.drive is None else None
+    for run in campaign.decays:
+        frequency = starting_frequency(run.record)
         if frequency is None:
             continue
         reading = thinned_reading(evenly_spaced(run.record), frequency)

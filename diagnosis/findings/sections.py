@@ -54,7 +54,7 @@ def sections(answer: Findings, campaign: Campaign | None = None) -> tuple[Sectio
     Args:
         campaign: adds the conditions of the runs.
     """
-    blown = any(run.wind_on for run in campaign.runs) if campaign else windy(answer)
+    blown = bool(campaign.in_wind) if campaign else windy(answer)
     listed = (
         Head.of(answer).section,
         Section("answer", "The answer", (Paragraph(str(answer.verdict)),)),

@@ -28,9 +28,8 @@ def parameter_unit(name: str, campaign: Campaign, model: NominalModel) -> str:
     info = next(info for info in effect_class(effect).parameters() if info.name == parameter)
     rig = campaign.rig
     if info.per_pressure:
-        dense = all(run.air_density is not None for run in campaign.runs if run.wind_on)
         factors = {
-            "kg/m3": not dense,
+            "kg/m3": not campaign.states_density,
             "m2": rig.frontal_area is None,
             "m": rig.reference_length is None,
             "1/(kg m2)": model.per_inertia,

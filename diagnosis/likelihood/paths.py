@@ -178,7 +178,7 @@ class Path:
         data, run = self.fit.problem.data, self.run
         inertia, damping, stiffness = linear_coefficients(self.fit, self.index)
         pressure = data.air_moment(run)
-        lag = pressure * data.reference_length / run.wind_speed if run.wind_on else 0.0
+        lag = data.air_damping(run)
         swing = (stiffness * self.angle + damping * self.rate) / inertia  # the angular acceleration, reversed
         moments = {
             "yaw_inertia": swing,

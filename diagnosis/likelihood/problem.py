@@ -104,7 +104,7 @@ class Problem:
         """Whether the joint carries a moment that varies: gravity's, or that of an actuator."""
         terms = {*self.data.model.law_parameters, *(term for kind in self.effects for term in kind.law_terms)}
         hangs = any(stiffness in terms for stiffness, _ in WEIGHTS)
-        return hangs or any(run.drive is not None and run.drive.through_actuator for run in self.data.runs)
+        return hangs or any(drive.through_actuator for drive in self.data.inputs)
 
     def effects_at(self, common: Array) -> tuple[Effect, ...]:
         """The effects with their parameters.
@@ -214,10 +214,9 @@ class Problem:
         runs = self.data.runs
         values = self._columns(np.tile(point.common, (len(runs), 1)), point.per_run[: len(runs)])
         stated, pressure = self.data.model.settings(values, runs), [self.data.air_moment(run) for run in runs]
-        speed = np.array([run.wind_speed if run.wind_on else np.inf for run in runs])
         stiffness = stated.spring_stiffness - pressure * stated["cn_beta"]
         stiffness += sum(effect.stiffness_at_rest for effect in self.effects_at(point.common))
-        rate = np.array(pressure) * self.data.reference_length / speed
+        rate = np.array([self.data.air_damping(run) for run in runs])
         damping = stated["mechanical_damping"] - rate * stated["cn_r"]
         return np.stack([stated["yaw_inertia"], damping, stiffness], axis=1)
 

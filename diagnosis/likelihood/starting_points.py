@@ -22,7 +22,6 @@ from tunnel_sim.effects import Effect
 from tunnel_sim.effects.capabilities import Clock, OwnNumbers
 from tunnel_sim.effects.evidence import Sought
 from tunnel_sim.effects.parameters import Circumstances, ParameterInfo, Trial
-from tunnel_sim.vocabulary.campaign import speed_groups
 from tunnel_sim.vocabulary.record import Array
 
 GROSS_MISFIT: Final = 0.01
@@ -302,7 +301,6 @@ def _own_parameters(problem: Problem, kind: type[Effect]) -> list[ParameterInfo]
 def _circumstances(base: Fit) -> Circumstances:
     data = base.problem.data
     greatest = max(float(np.max(np.abs(run.reading))) for run in data.runs)
-    speeds = set(speed_groups(run.wind_speed for run in data.runs if run.wind_on).values())
     moment, rate = 0.0, 0.0
     for run, own in zip(data.runs, base.point.per_run, strict=True):
         if run.drive is not None and run.drive.through_actuator:
@@ -310,7 +308,7 @@ def _circumstances(base: Fit) -> Circumstances:
             assert drive is not None
             own_moment, own_rate = drive.greatest
             moment, rate = max(moment, own_moment), max(rate, own_rate)
-    return Circumstances(data.springs, greatest, data.model.per_inertia, tuple(sorted(speeds)), moment, rate)
+    return Circumstances(data.springs, greatest, data.model.per_inertia, data.wind_speeds, moment, rate)
 
 
 def _with_effect(base: Fit, values: Array, scaled: int | None, replaced: int | None) -> Array:

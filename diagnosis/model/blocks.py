@@ -52,7 +52,7 @@ def prepare(
     """
     rig = campaign.rig
     model = model or nominal_model(campaign)
-    dense = all(run.air_density is not None for run in campaign.runs if run.wind_on)
+    dense = campaign.states_density
     runs = []
     for run in campaign.runs:
         record = run.record

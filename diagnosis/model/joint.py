@@ -325,7 +325,7 @@ def with_law(campaign: Campaign, law: JointLaw) -> tuple[Campaign, NominalModel]
             remedy="diagnose the runs of each spring separately",
         )
     rig = campaign.rig
-    if any(run.wind_on for run in campaign.runs) and None in (rig.frontal_area, rig.reference_length):
+    if campaign.in_wind and None in (rig.frontal_area, rig.reference_length):
         raise TunnelError(
             "runs with a wind speed need the rig's sizes beside the model",
             where="--model",

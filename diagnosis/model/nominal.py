@@ -23,7 +23,7 @@ from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.expression import Expression, parse
 from tunnel_sim.physics.run_settings import REFERENCE_SPEED, RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable
-from tunnel_sim.vocabulary.campaign import Campaign, mean_wind_speed, speed_groups
+from tunnel_sim.vocabulary.campaign import Campaign, mean_wind_speed
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.quantities import AnglePerRun, KgM2
 from tunnel_sim.vocabulary.record import Array
@@ -87,7 +87,7 @@ class NominalModel:
         """The model with what it depends on in a campaign."""
         return dataclasses.replace(
             self,
-            windy=any(run.wind_on for run in campaign.runs),
+            windy=bool(campaign.in_wind),
             mean_speed=mean_wind_speed((run.wind_speed for run in campaign.runs), REFERENCE_SPEED),
             own_zeros=campaign.sensor.zero == "per_run" and self.restored and "zero" not in self.held,
             unknown_gain=any(map(self.fits_gain, campaign.inputs)),
@@ -171,11 +171,8 @@ class NominalModel:
         """The aerodynamic derivatives; none in still air."""
         if not self.windy:
             return ()
-        runs = [run for run in data.runs if run.wind_on]
-        stiffness = max((data.air_moment(run) for run in runs), default=1.0)
-        damping = max(
-            (data.air_moment(run) * data.reference_length / run.wind_speed for run in runs), default=1.0
-        )
+        stiffness = max(map(data.air_moment, data.in_wind), default=1.0)
+        damping = max(map(data.air_damping, data.in_wind), default=1.0)
         return (
             Parameter("cn_beta", "1/rad", size=_AIR_STIFFNESS / stiffness),
             Parameter("cn_r", "1/rad", size=_AIR_DAMPING / damping),
@@ -185,7 +182,7 @@ class NominalModel:
         """The gain of an input, where it is not known."""
         if not self.unknown_gain:
             return ()
-        inputs = [float(np.max(np.abs(run.drive.values))) for run in data.runs if run.drive is not None]
+        inputs = [float(np.max(np.abs(drive.values))) for drive in data.inputs]
         size = 1e-2 * REFERENCE_STIFFNESS * data.swing / max(inputs, default=1.0)
         return (Parameter(GAIN, "N m", size=size),)
 
@@ -393,8 +390,7 @@ class NominalModel:
 
     def blind_spots(self, data: PreparedRuns) -> tuple[str, ...]:
         """The limits of these runs, as clauses; those of every campaign are last."""
-        speeds = set(speed_groups(run.wind_speed for run in data.runs if run.wind_on).values())
-        found = [*self.unseen(data)]
+        speeds, found = data.wind_speeds, [*self.unseen(data)]
         if not self.windy:
             found += [] if self.of_robot else ["any effect of the air: there is no run with the wind on"]
         elif len(speeds) < 2:
@@ -407,7 +403,7 @@ class NominalModel:
                 "a wind-speed offset as opposed to a dependence of Cnβ on the speed, but by the damping: there are "
                 "two wind speeds only"
             )
-        if self.windy and all(run.wind_on for run in data.runs):
+        if self.windy and not data.in_still_air:
             found.append("whether an effect is mechanical or aerodynamic: there is no run with the wind off")
         common = [one for one in self.parameters(data) if one.owner == "common" and one.name != "zero"]
         if len(data.runs) == 1:

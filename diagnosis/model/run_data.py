@@ -14,8 +14,10 @@ from diagnosis.model.similarity import REFERENCE_FREQUENCY
 from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable
+from tunnel_sim.vocabulary.campaign import speed_groups
 from tunnel_sim.vocabulary.plan import aerodynamic_stiffness
 from tunnel_sim.vocabulary.record import Array, Record, read_only
+from tunnel_sim.vocabulary.run_groups import RunGroups
 
 
 @dataclass(frozen=True, eq=False)
@@ -346,7 +348,7 @@ class RunData:
 
 
 @dataclass(frozen=True, eq=False)
-class PreparedRuns:
+class PreparedRuns(RunGroups[RunData]):
     """Runs of a campaign as the fits see them, with the sizes of the rig.
 
     Args:
@@ -362,9 +364,9 @@ class PreparedRuns:
     width: float
 
     @property
-    def driven(self) -> bool:
-        """Whether any of the runs has an input."""
-        return any(run.drive is not None for run in self.runs)
+    def inputs(self) -> tuple[DriveMoment, ...]:
+        """The moments of the driven runs."""
+        return tuple(run.drive for run in self.runs if run.drive is not None)
 
     @property
     def mean_block(self) -> float:
@@ -377,6 +379,11 @@ class PreparedRuns:
         """The largest angle of the motion from its middle, rad, also where the readings are rates."""
         turn = 2.0 * np.pi * REFERENCE_FREQUENCY
         return max(0.5 * float(np.ptp(run.reading)) / turn**run.derivative for run in self.runs)
+
+    @property
+    def wind_speeds(self) -> tuple[float, ...]:
+        """Settings of the wind speed, ascending, m/s; none in still air."""
+        return tuple(sorted(set(speed_groups(run.wind_speed for run in self.in_wind).values())))
 
     @property
     def springs(self) -> tuple[float, ...]:
@@ -392,6 +399,10 @@ class PreparedRuns:
         return aerodynamic_stiffness(
             1.0, air_density=run.air_density, wind_speed=run.wind_speed, **self._sizes
         )
+
+    def air_damping(self, run: RunData) -> float:
+        """The same for a rate coefficient of 1, ½ρVAl², N m s; 0 with the wind off."""
+        return self.air_moment(run) * self.reference_length / run.wind_speed if run.wind_on else 0.0
 
     def air_moments(self, runs: SettingsTable) -> Array:
         """The same of several runs, N m, shape (runs,)."""

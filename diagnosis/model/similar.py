@@ -27,7 +27,7 @@ def similar_campaign(campaign: Campaign, model: NominalModel | None = None) -> t
         at that frequency on a spring of that stiffness.
     """
     rig, sensor = campaign.rig, campaign.sensor
-    still = [run for run in campaign.runs if not run.wind_on] or list(campaign.runs)
+    still = campaign.in_still_air or campaign.runs
     time = float(np.median([free_frequency(run, sensor.derivative) for run in still])) / REFERENCE_FREQUENCY
     moment = (model or nominal_model(campaign)).moment_factor(campaign, time)
     rest = float(np.median([np.mean(run.record.yaw_rad) for run in campaign.runs]))

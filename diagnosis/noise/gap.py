@@ -223,7 +223,7 @@ class _Candidate:
         """
         chosen = self.nominal.settings
         if test.detected:
-            still = any(not run.wind_on for run in self.nominal.problem.data.runs)
+            still = bool(self.nominal.problem.data.in_still_air)
             excessive = test.tests.get("noise level", 1.0) < _misbehaves(test.tests, chosen.gap)
             return still and not excessive and noise_colour(self.source, beyond=COLOUR_BEYOND) is not None
         repeats = alike_in_all_runs(self.nominal) or _follows_input(self.fit)
@@ -253,9 +253,8 @@ def _candidates(nominal: Fit, noise: Noise) -> Iterator[_Candidate]:
 def _in_still_air(nominal: Fit) -> Iterator[Fit]:
     """The fit of the runs with the wind off alone, where there are others."""
     data = nominal.problem.data
-    still = tuple(run for run in data.runs if not run.wind_on)
-    if 0 < len(still) < len(data.runs):
-        only = data.with_runs(still)
+    if data.in_wind and data.in_still_air:
+        only = data.with_runs(data.in_still_air)
         with suppress(FitError, np.linalg.LinAlgError):
             yield refit(Problem(only), nominal_start(only))
 

@@ -302,7 +302,8 @@ def native_closure(
     """
     runs = chosen.problem.data.runs
     known = chosen_out.points.keys() & nominal_out.residuals.keys()
-    held = [i for i, run in enumerate(runs) if run.id in known and not run.wind_on]
+    still = [run.id for run in chosen.problem.data.in_still_air]
+    held = [i for i, run in enumerate(runs) if run.id in known.intersection(still)]
     before: list[Array] = []
     fitted: list[Array] = []
     engine: list[Array] = []
@@ -311,7 +312,7 @@ def native_closure(
         before.append(nominal_out.residuals[runs[i].id])
         fitted.append(chosen_out.residuals[runs[i].id])
         engine.append(_restarted(chosen.problem, common, start, i, simulate, native)[1])
-    ids = [] if held else [run.id for run in runs if not run.wind_on]
+    ids = [] if held else still
     if ids:
         turns = turns_of(nominal, ids)
         plain, caused = predict_stretches(nominal, turns), predict_stretches(chosen, turns)
@@ -419,7 +420,7 @@ def refuse_unpatchable(model: JointModel, campaign: Campaign, path: Path) -> Non
     Raises:
         TunnelError: when every run has the wind on, or the engine cannot write or simulate the given model.
     """
-    still = [run for run in campaign.runs if not run.wind_on]
+    still = campaign.in_still_air
     if not still:
         raise TunnelError(
             "a patched model is simulated against runs with the wind off, and there are none",

@@ -121,7 +121,7 @@ def runs_beyond_chance(excesses: Sequence[RunExcess], chosen: WhereSettings) -> 
 def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Conclusion:
     """Whether the gap needs wind: ``wind_on`` where the wind-off runs, fitted alone, show no gap."""
     runs, shown, chosen = nominal.problem.data.runs, found.maps.runs, nominal.settings.where
-    off = tuple(run.id for run in runs if not run.wind_on)
+    off = tuple(run.id for run in nominal.problem.data.in_still_air)
     if len(off) == len(runs):
         return Conclusion("always", Fact("wind off"))
     if not off:
@@ -193,7 +193,7 @@ def infer_channel(nominal: Fit, survey: Survey, condition: str | None) -> Conclu
     apart = _between_runs(nominal, survey)
     if apart is not None:
         return apart
-    if all(run.drive is not None for run in nominal.problem.data.runs):
+    if not nominal.problem.data.decays:
         return Conclusion(None, Fact("every run driven"))
     frequency, damping = drift(list(survey.maps.backbones))
     if frequency > DRIFT_RATIO * max(damping, 0.0) and frequency > 0.0:

@@ -14,6 +14,7 @@ from tunnel_sim.vocabulary.inputs import KnownGain
 from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Record
 from tunnel_sim.vocabulary.rig import JointLaw, Rig
+from tunnel_sim.vocabulary.run_groups import RunGroups
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -192,7 +193,7 @@ def needs_density(wind_speed: float, *scales: float | None) -> bool:
 
 
 @dataclass(frozen=True)
-class Campaign:
+class Campaign(RunGroups[Run]):
     """The runs of one rig with one sensor; the sensor's zero is unknown.
 
     Args:
@@ -216,19 +217,9 @@ class Campaign:
         return tuple(run.drive for run in self.runs if run.drive is not None)
 
     @property
-    def driven(self) -> bool:
-        """Whether any run has an input."""
-        return bool(self.inputs)
-
-    @property
-    def driven_runs(self) -> tuple[Run, ...]:
-        """The runs with an input."""
-        return tuple(run for run in self.runs if run.drive is not None)
-
-    @property
-    def decays(self) -> tuple[Run, ...]:
-        """The free decays: the runs without an input."""
-        return tuple(run for run in self.runs if run.drive is None)
+    def states_density(self) -> bool:
+        """Whether every run with the wind on states its air density."""
+        return all(run.air_density is not None for run in self.in_wind)
 
     def checked_inputs(self) -> Campaign:
         """The campaign, whose driven runs can be identified.
@@ -275,7 +266,7 @@ class Campaign:
     def __repr__(self) -> str:
         """The runs, their conditions, and where to go from here, in three lines."""
         count = f"{len(self.runs)} run{'' if len(self.runs) == 1 else 's'}"
-        on = sum(run.wind_on for run in self.runs)
+        on = len(self.in_wind)
         springs = [run.spring_stiffness for run in self.runs if run.spring_stiffness is not None]
         driven = len(self.inputs)
         stated = [

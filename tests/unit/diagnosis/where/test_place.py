@@ -305,9 +305,9 @@ def test_the_larger_drift_decides_from_one_and_a_half_times_the_other(
     assert infer_channel(_ONE_DECAY, _without_a_blow(()), "always").value == channel
 
 
+_DECAY = SimpleNamespace(reading=np.zeros(100))
 _ONE_DECAY = SimpleNamespace(
-    settings=Settings(),
-    problem=SimpleNamespace(data=SimpleNamespace(runs=[SimpleNamespace(reading=np.zeros(100), drive=None)])),
+    settings=Settings(), problem=SimpleNamespace(data=SimpleNamespace(runs=[_DECAY], decays=[_DECAY]))
 )
 
 
