@@ -16,7 +16,7 @@ from diagnosis.model.rig import SpringModel
 from diagnosis.model.run_data import PreparedRuns, RunData
 from diagnosis.model.servo import OF_GEAR
 from diagnosis.model.similarity import Similarity, frequency
-from diagnosis.model.starts import Shown, responses
+from diagnosis.model.starts import InputResponse, Shown
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.capabilities import Backlash
 from tunnel_sim.effects.parameters import ParameterInfo
@@ -185,12 +185,8 @@ class Joint(_OfLaw, SpringModel):
     def _driven_start(self, data: PreparedRuns) -> FitStart:
         """The readings count as positions of the joint."""
         law = self.law
-        found = [
-            (run.drive.scale, one)
-            for run, one in zip(data.runs, responses(data), strict=True)
-            if run.drive is not None
-        ]
-        shown = [(gain / one[2], one[0]) for gain, one in found if one is not None and gain * one[2] > 0.0]
+        found = filter(None, map(InputResponse.of, data.runs))
+        shown = [(one.inertia, one.rate) for one in found if one.scale * one.gain > 0.0]
         inertia, loss = np.median(shown, axis=0).tolist() if shown else (law.inertia, 0.0)
         damping = max(2.0 * loss * inertia, law.damping)
         own = [
@@ -298,8 +294,7 @@ def recorded(campaign: Campaign, actuator: str | None = None) -> Recorded:
     """
     from tunnel_sim.engine.joint_model import Recorded  # only here: MuJoCo is slow to load
 
-    by_control = ("drive", "command_rad")
-    controlled = any(drive.column in by_control for drive in campaign.inputs)
+    controlled = bool(campaign.driven_by("drive", "command_rad"))
     if not campaign.driven or campaign.sensor.derivative:  # driven runs of rates are refused later
         return Recorded(reach(campaign), 0.0 if campaign.driven else None, controlled, actuator)
     means = [np.nanmean(run.record.yaw_rad) for run in campaign.runs]

@@ -17,7 +17,7 @@ from diagnosis.model.similarity import (
     REFERENCE_STIFFNESS,
     response_to_input,
 )
-from diagnosis.model.starts import responses
+from diagnosis.model.starts import InputResponse
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.parameters import SWING, ParameterInfo
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -93,11 +93,8 @@ class LooseBody(NominalModel):
 
     def starts(self, data: PreparedRuns) -> Iterator[FitStart]:
         """Inertia and damping by the response to known moments, and no other moment."""
-        found = [
-            (run.drive.scale / response[2], 2.0 * response[0])
-            for run, response in zip(data.runs, responses(data), strict=True)
-            if response is not None and run.drive is not None
-        ]
+        shown = filter(None, map(InputResponse.of, data.runs))
+        found = [(response.inertia, 2.0 * response.rate) for response in shown]
         inertia, loss = np.median(found or [(REFERENCE_INERTIA, 0.0)], axis=0).tolist()
         own = [
             {
@@ -117,6 +114,16 @@ class LooseBody(NominalModel):
         """The stiffness with which it would swing at the reference frequency, N m/rad."""
         del stiffness
         return inertia * (2.0 * np.pi * REFERENCE_FREQUENCY) ** 2
+
+    def critical_damping(self, inertia: float, stiffness: float) -> float | None:
+        """None: it does not swing."""
+        del inertia, stiffness
+        return None
+
+    def may_scatter(self, kinds: Sequence[type[Effect]]) -> Sequence[type[Effect]]:
+        """None: the differences are those of a swing."""
+        del kinds
+        return ()
 
     def tells(self, info: ParameterInfo, swing: float) -> bool:
         """In small swings the rest angle of a body that nothing else holds acts as a constant moment does."""

@@ -16,11 +16,11 @@ from diagnosis.model.nominal import FitStart, NominalModel
 from diagnosis.model.rig import PerInertia, SpringModel
 from diagnosis.model.run_data import PreparedRuns, RunData
 from diagnosis.model.similarity import Similarity
-from diagnosis.model.starts import responses
+from diagnosis.model.starts import InputResponse
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.capabilities import Backlash
 from tunnel_sim.physics.settings_table import SettingsTable
-from tunnel_sim.vocabulary.campaign import Campaign, Run
+from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
@@ -35,11 +35,7 @@ _SLOW = 0.1  # 1/s: a small decay rate of the similar rig
 
 def by_command(campaign: Campaign) -> bool:
     """Whether any run is driven by the command of a servo."""
-    return any(_commanded(run) for run in campaign.runs)
-
-
-def _commanded(run: Run) -> bool:
-    return run.drive is not None and "servo_kv" in run.drive.kind.keys
+    return bool(campaign.driven_by("command_rad"))
 
 
 @dataclass(frozen=True)
@@ -66,8 +62,9 @@ class _OfServo(NominalModel):
         Raises:
             TunnelError: for the first such run.
         """
+        commanded = {run.id for run in campaign.driven_by("command_rad")}
         for run in campaign.runs:
-            if not _commanded(run):
+            if run.id not in commanded:
                 raise TunnelError(
                     "the run has no command_rad, but other runs do: the servo may have been off",
                     where=f"{campaign.name}, run '{run.id}'",
@@ -132,9 +129,9 @@ class Servo(_OfServo, SpringModel):
     def starts(self, data: PreparedRuns) -> Iterator[FitStart]:
         """Inertia and damping by the response to the command, whose gain is the kp; then as a rig."""
         shown = [
-            (run.spring_stiffness / one[1], 2.0 * one[0])
-            for run, one in zip(data.runs, responses(data), strict=True)
-            if one is not None and run.spring_stiffness is not None
+            (run.spring_stiffness / response.stiffness, 2.0 * response.rate)
+            for run in data.runs
+            if (response := InputResponse.of(run)) is not None and run.spring_stiffness is not None
         ]
         if shown and not self.own_zeros:
             inertia, loss = np.median(shown, axis=0).tolist()

@@ -50,18 +50,18 @@ class Shown:
             squares: squared frequencies of the runs, 1/s²; None: from their spectra, and for driven runs from the
                 resonance between input and motion.
         """
-        driven = responses(data)
+        driven = [InputResponse.of(run) for run in data.runs]
         if squares is None:
             squares = [
-                _by_spectrum(run) if response is None else response[1]
+                _by_spectrum(run) if response is None else response.stiffness
                 for run, response in zip(data.runs, driven, strict=True)
             ]
         swing = np.array([float(np.std(run.reading)) for run in data.runs])
-        losses = [2.0 * one[0] for one in driven if one is not None and one[0] > 0.0]
+        losses = [2.0 * one.rate for one in driven if one is not None and one.rate > 0.0]
         gains = [
-            response[2] / run.drive.scale
+            response.gain / response.scale
             for run, response in zip(data.runs, driven, strict=True)
-            if response is not None and run.multiplied_by == GAIN and run.drive is not None
+            if response is not None and run.multiplied_by == GAIN
         ]
         return cls(
             np.array(squares),
@@ -92,20 +92,42 @@ def decay_squares(data: PreparedRuns) -> list[float] | None:
     return found
 
 
-def responses(data: PreparedRuns) -> list[tuple[float, float, float] | None]:
-    """Decay rate (1/s), stiffness (1/s²) and gain (rad/s² per unit) of every run; None where it shows no resonance.
+@dataclass(frozen=True)
+class InputResponse:
+    """The response of a run to its input.
 
-    Of a body without a spring the gain must be positive, in N m of the input.
+    Args:
+        rate: of the decay, 1/s.
+        stiffness: over the inertia, 1/s².
+        gain: rad/s² per unit of the input.
+        scale: moment of the input, N m per unit.
     """
-    return [None if run.drive is None else _response(run) for run in data.runs]
 
+    rate: float
+    stiffness: float
+    gain: float
+    scale: float
 
-def _response(run: RunData) -> tuple[float, float, float] | None:
-    sprung = run.spring_stiffness != 0.0
-    found = driven_start(run.times, run.reading, run.input_means, sprung=sprung, derivative=run.derivative)
-    if found is None or run.drive is None or (found[1] if sprung else found[2] * run.drive.scale) <= 0.0:
-        return None
-    return found
+    @classmethod
+    def of(cls, run: RunData) -> InputResponse | None:
+        """The response of a run; None where it has no input or shows no resonance.
+
+        Of a body without a spring the gain must be positive, in N m of the input.
+        """
+        if run.drive is None:
+            return None
+        sprung, scale = run.spring_stiffness != 0.0, run.drive.scale
+        found = driven_start(
+            run.times, run.reading, run.input_means, sprung=sprung, derivative=run.derivative
+        )
+        if found is None or (found[1] if sprung else found[2] * scale) <= 0.0:
+            return None
+        return cls(*found, scale)
+
+    @property
+    def inertia(self) -> float:
+        """Of the body, kg m², where the scale is known."""
+        return self.scale / self.gain
 
 
 def _by_spectrum(run: RunData) -> float:

@@ -12,8 +12,8 @@ from tunnel_sim.vocabulary.rig import Actuator
 
 def controlled(campaign: Campaign, actuator: Actuator | None) -> frozenset[str]:
     """Ids of the runs whose input is the control of the model's actuator; the others' is a moment on the joint."""
-    runs = campaign.runs if actuator is not None else ()
-    return frozenset(run.id for run in runs if run.drive is not None and run.drive.column == "drive")
+    runs = campaign.driven_by("drive") if actuator is not None else ()
+    return frozenset(run.id for run in runs)
 
 
 def native_actuator(

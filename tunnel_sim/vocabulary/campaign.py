@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 from tunnel_sim.vocabulary.between_runs import Repeatability as Repeatability
 from tunnel_sim.vocabulary.drive import Drive, checked_drive, refuse_several_gains, refuse_untreated
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, installing
-from tunnel_sim.vocabulary.inputs import KnownGain
+from tunnel_sim.vocabulary.inputs import InputColumn, KnownGain
 from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Record
 from tunnel_sim.vocabulary.rig import JointLaw, Rig
@@ -220,6 +220,11 @@ class Campaign(RunGroups[Run]):
     def states_density(self) -> bool:
         """Whether every run with the wind on states its air density."""
         return all(run.air_density is not None for run in self.in_wind)
+
+    def driven_by(self, *columns: InputColumn) -> tuple[Run, ...]:
+        """The runs whose input is in one of some columns."""
+        pairs = zip(self.driven_runs, self.inputs, strict=True)
+        return tuple(run for run, drive in pairs if drive.column in columns)
 
     def checked_inputs(self) -> Campaign:
         """The campaign, whose driven runs can be identified.
