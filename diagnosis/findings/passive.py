@@ -104,15 +104,15 @@ def _shared(fit: Fit) -> bool:
 def _greatest(study: Study, name: str) -> float | None:
     """The whole rate of the fitted motion as a damping ratio or damping, with its uncertainty; None: not known."""
     fit, data = study.chosen, study.chosen.problem.data
-    if data.driven or data.wind_on or not data.model.restored or study.chosen is study.nominal:
+    if data.driven or data.wind_on or study.chosen is study.nominal:
         return None
     ratio = damping_ratio(fit)
     if ratio is None:
         return None
     inertia, _, stiffness = linear_coefficients(fit, 0)
-    if stiffness <= 0.0:
+    critical = data.model.critical_damping(inertia, stiffness)
+    if critical is None:
         return None
-    critical = 2.0 * math.sqrt(inertia * stiffness)
     # the whole rate is known as well as the damping of the nominal model, in noise as large as the misfit
     reach = 2.0 * _std(study.nominal) * math.sqrt(1.0 + max(fit.excess, 0.0)) / critical
     whole = ratio + reach

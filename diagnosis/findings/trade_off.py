@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -50,8 +49,9 @@ def _together(fit: Fit, campaign: Campaign, pair: tuple[str, str]) -> Combinatio
     quantity, scale = pair[0], np.array(scales)
     inertia, _, stiffness = linear_coefficients(fit, 0)
     unit = units[0]
-    if pair[0] == "mechanical_damping" and data.model.restored and stiffness > 0.0:
-        quantity, unit, scale[0] = "zeta", "1", 0.5 / math.sqrt(inertia * stiffness)
+    critical = data.model.critical_damping(inertia, stiffness)
+    if pair[0] == "mechanical_damping" and critical is not None:
+        quantity, unit, scale[0] = "zeta", "1", 1.0 / critical
     bounds = np.array([[end[place] for end in problem.bounds] for place in places])
     return Combination.of(
         quantity,

@@ -18,7 +18,7 @@ from diagnosis.model.similarity import (
     response_to_input,
 )
 from diagnosis.model.starts import InputResponse
-from tunnel_sim.effects import Effect
+from tunnel_sim.effects import BetweenRuns, Effect
 from tunnel_sim.effects.parameters import SWING, ParameterInfo
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -120,7 +120,7 @@ class LooseBody(NominalModel):
         del inertia, stiffness
         return None
 
-    def may_scatter(self, kinds: Sequence[type[Effect]]) -> Sequence[type[Effect]]:
+    def may_scatter(self, kinds: Sequence[type[Effect]]) -> Sequence[type[BetweenRuns]]:
         """None: the differences are those of a swing."""
         del kinds
         return ()

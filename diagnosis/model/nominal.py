@@ -7,6 +7,7 @@ asks which kind it is.
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -17,7 +18,7 @@ import numpy as np
 from diagnosis.model.parameters import GAIN, Parameter, released
 from diagnosis.model.run_data import PreparedRuns, RunData
 from diagnosis.model.similarity import REFERENCE_STIFFNESS, Similarity
-from tunnel_sim.effects import Effect
+from tunnel_sim.effects import BetweenRuns, Effect
 from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.expression import Expression, parse
@@ -326,6 +327,14 @@ class NominalModel:
         """The stiffness of that frequency, N m/rad; arguments as in `frequency`."""
         del inertia
         return stiffness
+
+    def critical_damping(self, inertia: float, stiffness: float) -> float | None:
+        """The damping whose ratio is 1, N m s/rad; None where nothing restores the body."""
+        return 2.0 * math.sqrt(inertia * stiffness) if stiffness > 0.0 else None
+
+    def may_scatter(self, kinds: Sequence[type[Effect]]) -> Sequence[type[BetweenRuns]]:
+        """The chance differences between runs that it can have."""
+        return [kind for kind in kinds if issubclass(kind, BetweenRuns)]
 
     def fitted_spring(self, value: Mapping[str, float]) -> float | None:
         """Stiffness of a spring that is fitted, N m/rad; None where it is stated or there is none."""

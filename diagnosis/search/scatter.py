@@ -39,11 +39,7 @@ _TOLERANCE = 1e-7  # drop of χ², as a share of it, at which the answer's fit h
 
 def may_scatter(kinds: Sequence[type[Effect]], data: Data) -> tuple[type[BetweenRuns], ...]:
     """The differences that the runs could show: at least three runs have the quantity, and a spring."""
-    if not data.model.restored:
-        return ()
-    return tuple(
-        kind for kind in kinds if issubclass(kind, BetweenRuns) and data.acts(kind).sum() >= _FEWEST
-    )
+    return tuple(kind for kind in data.model.may_scatter(kinds) if data.acts(kind).sum() >= _FEWEST)
 
 
 def with_deviations(problem: Problem, point: Point, scatter: Scatter) -> tuple[Problem, Point]:
