@@ -50,12 +50,8 @@ def other_hold(study: Study) -> OtherHold | None:
     if DELAY.name not in study.causes or DELAY not in problem.effects or len(inputs) != 1:
         return None
     (held,) = inputs
-    runs = tuple(
-        run if run.drive is None else replace(run, drive=replace(run.drive, held=not held))
-        for run in problem.data.runs
-    )
     effects = tuple(kind for kind in problem.effects if kind is not DELAY)
-    tried = replace(problem, data=problem.data.with_runs(runs), effects=effects)
+    tried = replace(problem, data=problem.data.with_inputs(held=not held), effects=effects)
     whole = dict(zip(problem.names, fit.point.common.tolist(), strict=True))
     start = Point(np.array([whole[name] for name in tried.names]), fit.point.per_run)
     fitted = try_fit(tried, start)

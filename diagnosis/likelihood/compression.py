@@ -71,7 +71,7 @@ def _joined(run: RunData, frequency: float, blocks: int) -> int:
         frequency: of the run's motion, Hz.
         blocks: fewest wider blocks in a cycle.
     """
-    if run.drive is not None or run.derivative > 0 or not run.plain:
+    if not run.mergeable:
         return 1
     most = min(_MOST, 1.0 / (frequency * run.interval * blocks), run.reading.size / 2)
     return int(2 ** np.floor(np.log2(max(most, 1.0))))

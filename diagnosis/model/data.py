@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +52,10 @@ class Data(PreparedRuns):
     def with_runs(self, runs: tuple[RunData, ...]) -> Data:
         """Other runs of the same campaign, whose model has the same parameters."""
         return dataclasses.replace(self, runs=runs)
+
+    def with_inputs(self, **change: Any) -> Data:
+        """The same runs with changed fields of their inputs (`DriveMoment`)."""
+        return self.with_runs(tuple(run.with_input(**change) for run in self.runs))
 
     def undriven(self) -> Data:
         """The same runs as free decays, whose model has the same parameters."""

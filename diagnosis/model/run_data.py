@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -142,11 +143,13 @@ class RunData:
     merges: int = 1
     shorter: Array | None = field(default=None, repr=False)
 
-    def merged(self, count: int) -> RunData:
-        """The run in longer blocks, each made of several of its own; a remainder at the end is dropped.
+    @property
+    def mergeable(self) -> bool:
+        """Whether longer blocks show its motion: angles of a free decay, evenly spaced, in white noise."""
+        return self.drive is None and self.derivative == 0 and self.plain
 
-        Its samples are evenly spaced, and its noise is white.
-        """
+    def merged(self, count: int) -> RunData:
+        """A `mergeable` run in longer blocks, each of several of its own; a remainder at the end is dropped."""
         size = self.reading.size // count
         shorter = self.reading[: size * count]
         return dataclasses.replace(
@@ -207,6 +210,12 @@ class RunData:
             values=self.drive.values[seen],
             delay=self.drive.delay - self.start,
         )
+
+    def with_input(self, **change: Any) -> RunData:
+        """The run with changed fields of its input; a free decay as it is."""
+        if self.drive is None:
+            return self
+        return dataclasses.replace(self, drive=dataclasses.replace(self.drive, **change))
 
     def undriven(self) -> RunData:
         """The run as a free decay."""
@@ -324,6 +333,10 @@ class RunData:
             noise=self.noise.part(first, last),
             shorter=None if self.shorter is None else self.shorter[first * self.merges : last * self.merges],
         )
+
+    def beginning(self, blocks: int) -> RunData:
+        """The first blocks of a driven run; a free decay, or a shorter run, as it is."""
+        return self if self.drive is None or self.reading.size <= blocks else self.part(last=blocks)
 
     @property
     def noise_std(self) -> float:

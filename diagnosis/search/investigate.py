@@ -158,11 +158,7 @@ def likeliest_lead(study: Study) -> float:
     effects = tuple(kind for kind in problem.effects if not issubclass(kind, InputClock))
     whole = dict(zip(problem.names, point.common.tolist(), strict=True))
     for lead in leads:
-        runs = tuple(
-            r if r.drive is None else replace(r, drive=replace(r.drive, delay=-lead))
-            for r in problem.data.runs
-        )
-        tried = replace(problem, data=problem.data.with_runs(runs), effects=effects)
+        tried = replace(problem, data=problem.data.with_inputs(delay=-lead), effects=effects)
         fitted = try_fit(tried, Point(np.array([whole[name] for name in tried.names]), point.per_run))
         if fitted is None:
             return 0.0

@@ -37,9 +37,9 @@ def common_length(data: Data) -> int:
 
     Shorter runs and free decays stay whole. 0 where these alone have more.
     """
-    free = sum(run.reading.size for run in data.runs if run.drive is None)
+    free = sum(run.reading.size for run in data.decays)
     left, length = max(data.settings.search.begun_on - free, 0), 0
-    sizes = sorted(run.reading.size for run in data.runs if run.drive is not None)
+    sizes = sorted(run.reading.size for run in data.driven_runs)
     for number, size in enumerate(sizes):
         length = left // (len(sizes) - number)
         if size > length:
@@ -50,10 +50,7 @@ def common_length(data: Data) -> int:
 
 def beginnings(data: Data, length: int) -> Data:
     """Driven runs up to a length, in blocks; shorter ones and free decays stay whole."""
-    cut = (run.drive is not None and run.reading.size > length for run in data.runs)
-    return data.with_runs(
-        tuple(run.part(last=length) if long else run for run, long in zip(data.runs, cut, strict=True))
-    )
+    return data.with_runs(tuple(run.beginning(length) for run in data.runs))
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +65,7 @@ class Beginnings(WholeRuns):
         stated scatter.
         """
         data, chosen = prepared.nominal.problem.data, prepared.settings.search
-        length, driven = common_length(data), [run.interval for run in data.runs if run.drive is not None]
+        length, driven = common_length(data), [run.interval for run in data.driven_runs]
         cycles = length * REFERENCE_FREQUENCY * min(driven, default=0.0)
         if sum(run.reading.size for run in data.runs) <= chosen.long_input or cycles < _LEAST:
             return None
