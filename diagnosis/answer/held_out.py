@@ -198,7 +198,8 @@ def share_ahead(study: Study, whole: Collection[str]) -> float | None:
     """
     nominal, chosen = study.nominal, study.chosen
     runs = nominal.problem.data.runs
-    ahead = [run.drive is not None and run.id not in whole for run in runs]
+    driven = {run.id for run in nominal.problem.data.driven_runs}
+    ahead = [run.id in driven.difference(whole) for run in runs]
     if not study.named or study.random is not None or chosen is nominal or not any(ahead):
         return None
     seen = [

@@ -23,7 +23,6 @@ from identification.signal.strokes import reversals, strokes
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.capabilities import Friction
 from tunnel_sim.files.writing import as_json
-from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.vocabulary.quantities import Angles, Rates
 from tunnel_sim.vocabulary.record import Array
 
@@ -194,10 +193,10 @@ def _strokes(fit: Fit) -> list[_Passed]:
         if run.derivative or turns.size < 2:
             continue
         stiffness, centre = float(fit.linear[place, 2]), fit.zero(place)
-        drive = problem.chain(fit.point.common, fit.point.per_run[place], run).physics().drive
-        moment = None if drive is None else _moment(drive, run.times)
+        physics = problem.chain(fit.point.common, fit.point.per_run[place], run).physics()
+        moment = physics.input_moment(run.times)
         model, record = (strokes(one, turns, stiffness, moment, centre) for one in (predicted, run.reading))
-        force = stiffness * (model.angle - centre) - (0.0 if moment is None else moment[turns])
+        force = stiffness * (model.angle - centre) - moment[turns]
         error = run.noise_std * record.spread * np.abs(force)
         rate = _mean_rates(predicted, run.times, turns)
         found.append(_Passed(rate, model.travel, record.lost - model.lost, error))
@@ -209,16 +208,6 @@ def _mean_rates(angle: Array, time: Array, turns: NDArray[np.int64]) -> Array:
     rate = np.abs(np.gradient(angle, time))
     sums = [np.concatenate([[0.0], np.cumsum(rate**power)])[turns] for power in (1, 2)]
     return np.asarray(np.diff(sums[1]) / np.diff(sums[0]))
-
-
-def _moment(drive: DriveMoment, time: Array) -> Array:
-    """The moment of an input at some times since the start of the record, N m, shape (n,)."""
-    acting = drive.acting
-    at = time - acting.delay
-    if not acting.held:
-        return np.asarray(acting.scale * np.interp(at, acting.time_s, acting.values))
-    places = np.clip(np.searchsorted(acting.time_s, at, side="right") - 1, 0, None)
-    return np.asarray(acting.scale * acting.values[places])
 
 
 def _binned(runs: Sequence[_Passed], effect: Effect) -> list[FrictionPoint]:

@@ -54,8 +54,8 @@ class WhatItCosts(Finding):
     @classmethod
     def find(cls, answered: Answered) -> WhatItCosts | None:
         """The moments; None without named causes, without wind, and where no coefficient is determined."""
-        top = max(answered.campaign.runs, key=lambda run: run.wind_speed)
-        if not answered.study.named or not top.wind_on or top.air_density is None:
+        top = max(answered.campaign.in_wind, key=lambda run: run.wind_speed, default=None)
+        if not answered.study.named or top is None or top.air_density is None:
             return None
         moments = []
         for name, before in answered.before.items():

@@ -105,7 +105,8 @@ class CompiledRuns:
             campaign_rig(asked.data),
             len(asked.runs),
         )
-        driven = np.array([drive is not None for drive in physics.drive])
+        inputs = {place: drive.exerted for place, drive in physics.inputs.items()}
+        driven = np.isin(np.arange(count), list(inputs))
         slow = {
             place: found
             for place, twist in enumerate(physics.rod_twist)
@@ -133,7 +134,6 @@ class CompiledRuns:
         length = np.array([run.duration for run in runs])
         blocks = size + np.ceil(np.maximum(0.0, physics["duration"] - length) / interval).astype(np.int64)
         substeps = fit_substeps(physics, interval)
-        inputs = {place: drive.exerted for place, drive in enumerate(physics.drive) if drive is not None}
         for place, drive in inputs.items():
             substeps[place] = input_substeps(int(substeps[place]), float(interval[place]), drive)
         # joins between steps would show in a derivative of the angle

@@ -293,6 +293,11 @@ def misses_motion(fit: Fit) -> bool:
     return at_motion > GROSS_MISFIT * found.motion
 
 
+def loses_phase(fit: Fit) -> bool:
+    """Whether a fit misses the motion because it loses its phase, cycle by cycle; an input keeps the phase."""
+    return not fit.problem.data.driven and misses_motion(fit)
+
+
 def _own_parameters(problem: Problem, kind: type[Effect]) -> list[ParameterInfo]:
     """The parameters of an effect that are free in a problem."""
     return [info for info in kind.parameters() if f"{kind.name}.{info.name}" in problem.names]

@@ -15,7 +15,7 @@ from diagnosis.likelihood.least_squares import Fit, FitError, fit, scaled_residu
 from diagnosis.likelihood.mains_lines import fastest, mains_interval
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import CHANNELS, misfit
-from diagnosis.likelihood.starting_points import misses_motion, nominal_starts
+from diagnosis.likelihood.starting_points import loses_phase, misses_motion, nominal_starts
 from diagnosis.model.blocks import prepare, without_rest, without_start
 from diagnosis.model.data import Data
 from diagnosis.model.nominal import NominalModel
@@ -186,8 +186,8 @@ def prepared_and_tested(
         hum = None
         if HUM.name in allowed:
             nominal, noise, hum = _without_hum(campaign, similarity, nominal, noise)
-        # a second mode is missed from the start on, and its decay is counted from there; a driven run has none
-        missed = misses_motion(nominal) and not campaign.driven
+        # a second mode is missed from the start on, and its decay is counted from there
+        missed = loses_phase(nominal)
         cut = missed and second_mode_alone(nominal, kinds) is None
         uncut = nominal if cut else None
         if cut:

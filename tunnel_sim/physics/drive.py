@@ -132,6 +132,15 @@ class DriveMoment:
         """Whether its samples are at even times from 0 on, a whole number of steps apart, and it has no delay."""
         return self.delay == 0.0 and abs(self.time_s[0]) <= _EVEN * self.interval and self.on_steps(step)
 
+    def at(self, time: Times) -> Moments:
+        """The moment at some times since the run's start, N m, shape (n,)."""
+        acting = self.acting
+        at = time - acting.delay
+        if not acting.held:
+            return np.asarray(acting.scale * np.interp(at, acting.time_s, acting.values))
+        places = np.clip(np.searchsorted(acting.time_s, at, side="right") - 1, 0, None)
+        return np.asarray(acting.scale * acting.values[places])
+
     def means(self, ends: Times) -> PerSample:
         """Means of the delayed input between successive times since the run's start, which keep its impulse."""
         means: Array = _impulses(self.acting, ends)[0] / np.diff(ends)

@@ -14,6 +14,8 @@ from math import inf, isfinite, sqrt
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
 from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.moment_law import operation_names, parameter_names
 from tunnel_sim.vocabulary import limits
@@ -24,7 +26,7 @@ from tunnel_sim.vocabulary.quantities import (
     Rates,
     Times,
 )
-from tunnel_sim.vocabulary.record import read_only
+from tunnel_sim.vocabulary.record import Array, read_only
 from tunnel_sim.vocabulary.rig import Rig
 
 REFERENCE_SPEED = 20.0
@@ -206,6 +208,10 @@ class RunSettings:
         }
         changed: dict[str, Any] = {name: factor * getattr(self, name) for name, factor in factors.items()}
         return replace(self, series=series, **changed)
+
+    def input_moment(self, time: Array) -> Array:
+        """The moment of the input at some times since the run's start, N m, shape (n,); 0 in a free decay."""
+        return np.zeros_like(time) if self.drive is None else self.drive.at(time)
 
     def layout(self) -> tuple[object, ...]:
         """Properties that runs must share to use one compiled model.

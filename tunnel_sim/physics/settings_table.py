@@ -116,6 +116,11 @@ class SettingsTable:
         for name, value in values.items():
             self.numbers[rows, _further()[name]] = value
 
+    @property
+    def inputs(self) -> dict[int, DriveMoment]:
+        """The inputs of the driven runs by their places."""
+        return {place: drive for place, drive in enumerate(self.drive) if drive is not None}
+
     def change_drives(
         self, by: Sequence[Hashable], changed: Callable[[Any, DriveMoment], DriveMoment]
     ) -> None:
@@ -126,11 +131,11 @@ class SettingsTable:
             changed: the input after a change.
         """
         known: dict[tuple[Hashable, DriveMoment], DriveMoment] = {}
-        for place, (change, drive) in enumerate(zip(by, self.drive, strict=True)):
-            if drive is not None:
-                if (change, drive) not in known:
-                    known[change, drive] = changed(change, drive)
-                self.drive[place] = known[change, drive]
+        for place, drive in self.inputs.items():
+            change = by[place]
+            if (change, drive) not in known:
+                known[change, drive] = changed(change, drive)
+            self.drive[place] = known[change, drive]
 
     def row(self, place: int) -> RunSettings:
         """The settings of one run, whose numbers are not checked again; its step is the usual one."""

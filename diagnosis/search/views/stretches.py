@@ -17,7 +17,7 @@ from typing import Final, Self
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, FitError, fit
-from diagnosis.likelihood.starting_points import misses_motion
+from diagnosis.likelihood.starting_points import loses_phase, misses_motion
 from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
 from diagnosis.model.similarity import REFERENCE_FREQUENCY
@@ -162,7 +162,7 @@ class InStretches(View):
     @classmethod
     def after(cls, prepared: Prepared, known: Sets | None, clock: StepClock) -> Self | None:
         """The first view where the nominal model loses the phase of the motion; an input keeps the phase."""
-        lost = prepared.ringing is None and misses_motion(prepared.nominal) and not prepared.campaign.driven
+        lost = prepared.ringing is None and loses_phase(prepared.nominal)
         if known is not None or not prepared.able or not lost:
             return None
         with clock.step("effects"):
