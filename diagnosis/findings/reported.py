@@ -25,8 +25,6 @@ from tunnel_sim.vocabulary.record import Array
 INTEGRATOR_TOLERANCE: Final = 0.1
 """Maximum difference between MuJoCo and the integrator of the fits, in std of a block mean. Judgement."""
 
-_FINER = 4  # times as many steps where the input is delayed
-
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
@@ -130,11 +128,7 @@ def mujoco_blocks(problem: Problem, common: Array, release: Array) -> list[Array
     settings = []
     for i, (run, chain) in enumerate(zip(runs, chains, strict=True)):
         physics = released_by_spring_end(condensed(chain.physics(), problem.data))
-        steps = report_substeps(physics, run.interval)
-        if run.drive is not None:  # steps end at its samples
-            # a delayed or changed input is given by its means over the steps, which is of second order
-            finer = physics.drive is not None and not physics.drive.as_sampled
-            steps = run.block * -(-steps // run.block) * (_FINER if finer else 1)
+        steps = report_substeps(physics, run.interval, run.block)
         duration = (run.reading.size + blocks_beyond(physics, run) + 1) * run.interval
         settings.append(replace(physics, timestep=run.interval / steps, duration=duration))
         simulated.setdefault(run.interval, []).append(i)

@@ -53,6 +53,7 @@ _FIT_SHORTEST = 2e-4  # s, for any stiffness of the rod
 _FIT_MOST_TURN = pi  # rad from one block mean to the next: no record shows a faster oscillation
 _REPORT_ROD_TURN = 0.25  # rad
 _REPORT_SHORTEST = 1e-4  # s
+_REPORT_DELAYED = 4  # times as many steps where the input is delayed
 _UNSTABLE = 2.5  # rad per step; the method diverges beyond 2.8
 _LARGEST = 700.0  # logarithm of nearly the largest float
 _MOST_CONTACT_SUBSTEPS = 40
@@ -126,13 +127,21 @@ def compensated(law: Laws, wind_speed: SpeedPerRun, step: DurationPerRun) -> tup
     return found, step * (1.0 + turn**4 / 120.0)
 
 
-def report_substeps(run: RunSettings, interval: Seconds) -> int:
-    """Number of steps of the reported prediction from one block mean to the next, after an interval."""
+def report_substeps(run: RunSettings, interval: Seconds, block: int) -> int:
+    """Number of steps of the reported prediction from one block mean to the next, after an interval.
+
+    Args:
+        block: samples in the interval. Steps end at those of an input; a delayed or changed input is given by its
+            means over the steps, which is of second order.
+    """
     longest = REPORT_STEP
     if run.rod_twist is not None:
         rod = run.rod_twist.free_frequency(run.yaw_inertia)
         longest = min(REPORT_STEP, max(_REPORT_ROD_TURN / rod, _REPORT_SHORTEST))
-    return ceil(interval / longest - 1e-9)
+    steps = ceil(interval / longest - 1e-9)
+    if run.drive is None:
+        return steps
+    return block * -(-steps // block) * (1 if run.drive.as_sampled else _REPORT_DELAYED)
 
 
 def for_rod(run: RunSettings) -> RunSettings:

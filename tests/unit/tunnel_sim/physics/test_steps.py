@@ -129,7 +129,7 @@ def test_what_is_reported_takes_half_the_steps_of_a_fit_of_an_ordinary_body(
 ) -> None:
     slow = replace(PLAIN, spring_stiffness=16.12)
     for run in (slow, replace(slow, rod_twist=RodTwist(compliance, share))):
-        coarse, fine = substeps(run, interval), report_substeps(run, interval)
+        coarse, fine = substeps(run, interval), report_substeps(run, interval, 1)
         assert fine >= 2 * coarse - 1
         assert interval / fine <= 2e-3 * (1.0 + 1e-6)
 
