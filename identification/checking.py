@@ -240,7 +240,7 @@ def _check_deviations(subject: _Subject) -> None:
 def _check_partial(subject: _Subject) -> None:
     """Campaigns that do not determine all coefficients, and missing samples."""
     whole = _campaign()
-    still = replace(whole, runs=tuple(run for run in whole.runs if not run.wind_on))
+    still = replace(whole, runs=whole.in_still_air)
     unstated = replace(whole, runs=tuple(replace(run, spring_stiffness=None) for run in whole.runs))
     no_size = replace(whole, rig=RigProperties())
     one = replace(whole, runs=whole.runs[:1])

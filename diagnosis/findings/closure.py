@@ -170,7 +170,7 @@ def runs_table(
     named = judged.names_effects
     gaps = {run.id: run for run in gap.runs}
     runs = {run.id: run for run in campaign.runs} if campaign else {}
-    windy = any(run.wind_on for run in runs.values())
+    windy = campaign is not None and bool(campaign.in_wind)
     conditions = (
         ("spring [N m/rad]", *["wind [m/s]"] * windy, "duration [s]", "sample rate [Hz]") if runs else ()
     )

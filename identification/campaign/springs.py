@@ -118,7 +118,7 @@ def pair_remark(campaign: Campaign, runs: Sequence[RunEstimate]) -> Remark | Non
         campaign: states the stiffnesses.
         runs: the estimates; the natural frequencies of free decays with the wind off are compared.
     """
-    still = [run for run in campaign.runs if not run.wind_on and run.drive is None]
+    still = [run for run in campaign.decays if not run.wind_on]
     stated = {run.id: run for run in still if run.spring_stiffness}
     inertias: dict[float, list[Quantity]] = {}
     for found in runs:

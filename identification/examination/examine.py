@@ -57,7 +57,7 @@ def _few_samples(campaign: Campaign) -> tuple[Remark, ...]:
     if campaign.sensor.plausible is False:
         return ()
     found = []
-    for run in (run for run in campaign.runs if run.drive is None):
+    for run in campaign.decays:
         reading = run.record.yaw_rad
         # The steps of a slower motion are smaller, which is soon seen.
         if np.mean(np.diff(reading) ** 2) > _SLOW * np.var(reading) and (few := few_samples(run.record)):
@@ -153,11 +153,11 @@ def measured(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...], SlipEvid
     noted = noted_readings(kept)
     kept, clocks = with_clocks(kept)
     # Driven runs neither begin with a release nor end at rest, and their input is known.
-    driven, order = [run for run in kept.runs if run.drive is not None], [run.id for run in kept.runs]
-    if driven and len(driven) == len(order):
+    driven, order = kept.driven_runs, [run.id for run in kept.runs]
+    if driven and not kept.decays:
         return kept, (*faults, *noted, *clocks), None
     if driven:
-        kept = replace(kept, runs=tuple(run for run in kept.runs if run.drive is None))
+        kept = replace(kept, runs=kept.decays)
     kept, releases = from_releases(kept)
     kept, rests = without_rest(kept)
     kept, excited = self_excited_runs(kept)

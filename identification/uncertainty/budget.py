@@ -242,7 +242,7 @@ def make_budget(
         [budget.values * np.array(_POWERS[name])[columns] * inputs.common[name] for name in given]
     ).reshape(len(given), len(budget.names))
     notes = {"yaw_inertia": "the nominal inertia is not used"}
-    if not any(run.wind_on for run in campaign.runs):
+    if not campaign.in_wind:
         notes |= dict.fromkeys(("wind_speed", "air_density"), "no wind-on run")
     common = [
         Component(f"{name}, common", "B", np.outer(move, move), notes.get(name, ""))

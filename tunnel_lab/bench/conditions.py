@@ -170,7 +170,7 @@ def driven_runs(session: Session) -> frozenset[str]:
 def _driven(folder: Path, versions: tuple[tuple[int, int], ...]) -> frozenset[str]:
     """The driven runs of a folder while its run files keep their ``versions``: conditions do not change them."""
     del versions
-    return frozenset(run.id for run in read_campaign(folder).runs if run.drive is not None)
+    return frozenset(run.id for run in read_campaign(folder).driven_runs)
 
 
 def restore(

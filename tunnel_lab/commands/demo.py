@@ -240,8 +240,8 @@ def compare_estimators(plan: CampaignPlan, folder: Path) -> list[str]:
     from tunnel_lab.plotting import runs
 
     campaign, estimates = simulated_part(plan, folder)
-    off = next(run for run in campaign.runs if not run.wind_on)
-    pairs = [run for run in campaign.runs if run.wind_on and run.spring_stiffness == off.spring_stiffness]
+    off = campaign.in_still_air[0]
+    pairs = [run for run in campaign.in_wind if run.spring_stiffness == off.spring_stiffness]
     on = max(pairs, key=lambda run: run.wind_speed)
     save_both(runs.wind_off_on_figure(off, on), folder / "traces.png")
     save_both(runs.spectrum_figure((off, on)), folder / "spectrum.png")

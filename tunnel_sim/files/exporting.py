@@ -108,7 +108,7 @@ def _conditions(run: Run) -> dict[str, float | str]:
 
 def _input_columns(campaign: Campaign) -> tuple[str, ...]:
     """The input columns of any run, in the order of the format."""
-    found = {run.drive.column for run in campaign.runs if run.drive is not None}
+    found = {drive.column for drive in campaign.inputs}
     return tuple(name for name in INPUT_COLUMNS if name in found)
 
 

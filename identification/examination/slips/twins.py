@@ -73,7 +73,7 @@ def _equal(campaign: Campaign) -> Iterator[tuple[Run, Run, str]]:
 
 def _alike(campaign: Campaign) -> Iterator[tuple[Run, Run, str]]:
     """Free decays with the noise of an earlier run, among those nearest in size and length."""
-    free = [run for run in campaign.runs if run.drive is None and run.record.yaw_rad.size > _LEAST]
+    free = [run for run in campaign.decays if run.record.yaw_rad.size > _LEAST]
     order = sorted(free, key=lambda run: float(np.std(run.record.yaw_rad)))
     reach = max(1, _MOST_PAIRS // max(len(free), 1))
     size = next_fast_len(2 * max((run.record.yaw_rad.size for run in free), default=1), real=True)

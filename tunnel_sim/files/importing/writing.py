@@ -74,7 +74,7 @@ def write_imported(
 ) -> None:
     """Write the imported runs as a campaign, with its recipe; arguments as in `import_records`."""
     samples = sum(run.record.time_s.size for run in imported.campaign.runs)
-    driven = {run.id for run in imported.campaign.runs if run.drive is not None}
+    driven = {run.id for run in imported.campaign.driven_runs}
     recipe = {
         "schema_version": 1,
         "choices": imported.choices.model_dump(exclude_none=True, exclude_defaults=True),
