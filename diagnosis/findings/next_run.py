@@ -21,8 +21,8 @@ from diagnosis.model.parameters import Point
 from diagnosis.model.run_data import RunData
 from diagnosis.model.similarity import Similarity
 from identification.show.numbers import reading_shown
-from tunnel_sim.effects.capabilities import OwnNumbers, Periodic
 from identification.show.quantity import Quantity
+from tunnel_sim.effects.capabilities import OwnNumbers, Periodic
 from tunnel_sim.vocabulary.campaign import speed_groups
 from tunnel_sim.vocabulary.quantities import Seconds
 from tunnel_sim.vocabulary.record import Array

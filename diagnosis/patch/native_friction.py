@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from diagnosis.model.fact import Fact
+from diagnosis.patch.native_moments import NativeMoments, by_plugin, nearest_polynomial
 from tunnel_sim.effects.friction_laws import AGAINST_RATE, friction_of
 from tunnel_sim.physics.expression import parse
 from tunnel_sim.physics.moment_law import WEIGHTS
@@ -23,27 +24,6 @@ _FACTORS = {  # on the friction, by the term of the moment law
     "friction_peak": "(1+b*exp(-(r/vs)^2))",
 }
 _SYMBOLS = {"n": "exponent", "v0": "saturation", "b": "peak", "vs": "peak_rate"}
-
-
-@dataclass(frozen=True, eq=False)
-class NativeFriction:
-    """Friction as written into a model, in the units of the law.
-
-    Args:
-        loss: sliding friction of the joint, N m.
-        presliding: deflection at which a contact of that friction slides, rad or m; 0: ``frictionloss`` has none.
-        damping: added coefficients of ḃ, |ḃ|ḃ and ḃ³, N m s/rad, N m s²/rad² and N m s³/rad³, shape (3,).
-        program: of a further moment of the plugin; empty: none.
-        contact: numerics of the plugin's own friction, with their values and units, angles from rest; empty: none.
-        differences: where the native element follows another law, and causes left out.
-    """
-
-    loss: float = 0.0
-    presliding: float = 0.0
-    damping: Array = field(default_factory=lambda: np.zeros(3))
-    program: tuple[float, ...] = ()
-    contact: tuple[tuple[str, float, str], ...] = ()
-    differences: tuple[Fact, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -85,24 +65,6 @@ def _weight(parameters: Mapping[str, float]) -> tuple[float, float]:
     return float(np.abs(found)), -float(np.angle(found))
 
 
-def nearest_polynomial(powers: Array, wanted: Array, least: Array) -> Array:
-    """Coefficients of least squares with lower bounds; without them where they are met.
-
-    Args:
-        powers: shape (n, m).
-        wanted: shape (n,).
-        least: shape (m,), infinite where there is none.
-    """
-    sizes = np.max(np.abs(powers), axis=0)
-    found: Array = np.linalg.lstsq(powers / sizes, wanted, rcond=1e-12)[0] / sizes
-    if np.all(found >= least):
-        return found
-    from scipy.optimize import lsq_linear  # only here: the bounds seldom matter
-
-    bounded: Array = lsq_linear(powers / sizes, wanted, (least * sizes, np.inf)).x / sizes
-    return bounded
-
-
 def native_friction(
     parameters: Mapping[str, float],
     rates: Array,
@@ -110,7 +72,7 @@ def native_friction(
     damping: float,
     may_miss: float,
     carried: Carried = Carried(),
-) -> NativeFriction:
+) -> NativeMoments:
     """The friction of a moment law in the elements of MuJoCo.
 
     Presliding friction is that of a ``dcmotor`` without a control (``lugre``), which is Dahl's where it has no
@@ -132,9 +94,9 @@ def native_friction(
         return _with_load(parameters, rates, law, damping, may_miss, carried)
     moment, terms = friction.friction_moment, [term for term in AGAINST_RATE if parameters.get(term, 0.0)]
     if moment == 0.0 or not terms:
-        return NativeFriction(moment, friction.presliding)
+        return NativeMoments(loss=moment, presliding=friction.presliding)
     if law.slide:
-        return NativeFriction(moment, differences=(Fact("friction against rate"),))
+        return NativeMoments(loss=moment, differences=(Fact("friction against rate"),))
     wanted = friction.sliding(rates)
     powers = np.vander(rates / rates[-1], 4, increasing=True)
     least = np.array([0.0, -(law.damping + damping) * rates[-1], -np.inf, -np.inf])
@@ -146,13 +108,14 @@ def native_friction(
         may_miss == np.inf or (found[0] >= 0.0 and law.damping + damping + found[1] >= 0.0)
     ):
         figures = {"moment": _AGAINST_RATE, "missed_percent": 100.0 * missed}
-        return NativeFriction(float(found[0]), damping=found[1:], differences=(Fact("polynomial", figures),))
+        said = (Fact("polynomial", figures),)
+        return NativeMoments(damping=found[1:], loss=float(found[0]), differences=said)
     values = {"F": moment, "F0": friction.at_rest} | {
         symbol: getattr(friction, name) for symbol, name in _SYMBOLS.items()
     }
     text = f"-sign(r)*(F*{'*'.join(_FACTORS[term] for term in terms)}-F0)"
     program = parse(text, frozenset({"r", *values})).program(values, {"r": "rate"})
-    return NativeFriction(friction.at_rest, program=program, differences=(_by_plugin(_AGAINST_RATE),))
+    return NativeMoments(loss=friction.at_rest, program=program, differences=(by_plugin(_AGAINST_RATE),))
 
 
 def _with_load(
@@ -162,7 +125,7 @@ def _with_load(
     damping: float,
     may_miss: float,
     carried: Carried,
-) -> NativeFriction:
+) -> NativeMoments:
     """Friction that grows with the load; arguments of `native_friction`.
 
     A sliding contact: the plugin adds the part of gravity's moment to ``frictionloss``. At rest that part does not
@@ -171,7 +134,7 @@ def _with_load(
     """
     share, (size, rest) = parameters["friction_load"], _weight(parameters)
 
-    def beside(mean: float) -> NativeFriction:
+    def beside(mean: float) -> NativeMoments:
         moment = parameters.get("friction_moment", 0.0) + share * mean
         plain = {**parameters, "friction_load": 0.0, "friction_moment": moment}
         return native_friction(plain, rates, law, damping, may_miss)
@@ -180,7 +143,7 @@ def _with_load(
     if law.slide or may_miss == np.inf or found.program or not size:
         found = beside(carried.whole)
         return replace(found, differences=(*found.differences, Fact("friction against load")))
-    said = [_by_plugin(_AGAINST_LOAD)]
+    said = [by_plugin(_AGAINST_LOAD)]
     if carried.beyond:
         said.append(Fact("friction against load"))
     differences = (*found.differences, *said)
@@ -192,11 +155,7 @@ def _with_load(
             ("load_stiffness", size, "N m"),
             ("load_angle", rest, "rad"),
         )
-        return NativeFriction(contact=contact, differences=differences)
+        return NativeMoments(contact=contact, differences=differences)
     values = {"mu": share, "K": size, "k": rest}
     program = parse(_LOAD, frozenset({"r", "b", *values})).program(values, {"r": "rate", "b": "angle"})
     return replace(found, program=program, differences=differences)
-
-
-def _by_plugin(moment: str) -> Fact:
-    return Fact("no native element", {"moment": moment})

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import lru_cache, reduce
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache, partial
 from pathlib import Path
-from typing import Final
 
 import mujoco
 import numpy as np
@@ -22,255 +21,23 @@ from diagnosis.answer.held_out import (
     turns_of,
 )
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.likelihood.motions import blocks_beyond, condensed, sample_means
+from diagnosis.likelihood.motions import blocks_beyond, sample_means
 from diagnosis.likelihood.partial import fit_seen
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.data import FOLDS
 from diagnosis.model.fact import Fact
-from diagnosis.model.joint import Joint, LooseJoint, ServoJoint, reach
-from diagnosis.model.similarity import REFERENCE_FREQUENCY
-from diagnosis.patch.native_actuator import controlled, native_actuator
-from diagnosis.patch.native_friction import Carried, native_friction, nearest_polynomial
+from diagnosis.model.joint import reach
+from diagnosis.patch.elements import Control, DryFriction, FoundLaw, Inertia
+from diagnosis.patch.fitted_law import FittedLaw
 from diagnosis.patch.written_model import EngineModel, NativeClosure, NativeForm, PatchedModel
 from diagnosis.search.study import Study
-from tunnel_sim.effects.capabilities import InputClock
-from tunnel_sim.effects.drives import ActuatorEffect
 from tunnel_sim.engine.joint_model import JointModel
-from tunnel_sim.engine.joint_patch import (
-    ActuatorPatch,
-    JointPatch,
-    Start,
-    creep_rate,
-    history_of,
-    inertia_of_steps,
-    patched,
-    patched_xml,
-    simulate_joint,
-)
-from tunnel_sim.physics.expression import OF_ANGLE, OF_RATE, TEXTBOOK_POWERS, parse
-from tunnel_sim.physics.moment_law import operation_names
-from tunnel_sim.physics.run_settings import Motion, RunSettings
+from tunnel_sim.engine.joint_patch import Start, inertia_of_steps, patched, patched_xml, simulate_joint
+from tunnel_sim.physics.run_settings import Motion
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
-
-PATCHED_MISSES: Final = 0.02
-"""Maximum error of a polynomial in the patched model, as a share of the largest moment. Judgement."""
-
-_GRID = 201
-_NAMES = frozenset(
-    {"b", "r", "Kr", "gravity_angle", *TEXTBOOK_POWERS, *(name for name, *_ in (*OF_ANGLE, *OF_RATE))}
-)
-
-
-@dataclass(frozen=True)
-class FoundLaw:
-    """The law found for a joint, in the units of the given model.
-
-    Args:
-        patch: changes of the model: native elements, and the rest as a program.
-        differences: where the native element follows another law, and causes left out.
-    """
-
-    patch: JointPatch
-    differences: tuple[Fact, ...]
-
-
-def found_law(
-    problem: Problem,
-    common: Array,
-    release: Array,
-    noise: float,
-    index: int = 0,
-    actuator: ActuatorPatch | None = None,
-    *,
-    native_only: bool = False,
-) -> FoundLaw:
-    """The law of a fit, in the units of the measured campaign.
-
-    Args:
-        common: its common parameters, shape (common,).
-        release: of a run, shape (own,).
-        noise: of the sensor, rad; 0: not written.
-        index: of that run, with the wind off.
-        actuator: changes of the actuator that drives the joint; None: none.
-        native_only: whether every moment is written as the nearest native element, however far it is.
-    """
-    data = problem.data
-    assert isinstance(data.model, Joint | LooseJoint)
-    law, to_own_unit = data.model.law, data.similarity.own
-    chain = problem.chain(common, release, data.runs[index])
-    physics = condensed(chain.physics(), data)
-    zero = problem.zero(common, release)
-    reach = max(float(np.max(np.abs(run.reading - zero))) for run in data.runs)
-    b = np.linspace(-reach, reach, _GRID)
-    turn = np.sqrt(physics.spring_stiffness / physics.yaw_inertia) or 2.0 * np.pi * REFERENCE_FREQUENCY
-    rate = reach * turn
-    r = np.linspace(-rate, rate, _GRID)
-    differences: list[Fact] = []
-    loss = physics.parameters.get("loss_factor", 0.0) * np.sqrt(
-        physics.spring_stiffness * physics.yaw_inertia
-    )
-    fitted = dict(zip(problem.names, common.tolist(), strict=True))
-    kp = fitted.get("servo_kp")
-    of_servo = kp - data.model.kp if kp is not None and isinstance(data.model, ServoJoint) else 0.0
-    added = physics.spring_stiffness - law.stiffness - of_servo
-    spring = np.array([-fitted.get("moment_offset", 0.0), added, 0.0, 0.0])
-    damping = np.array([physics.mechanical_damping + loss - law.damping, 0.0, 0.0])
-    # the part of the program that effects add to the model's own
-    own_program = problem.stated(common, release, data.runs[index]).program
-    program = physics.program[len(own_program) :]
-    if native_only and program:
-        program = ()
-        differences.append(Fact("own law left out"))
-    if own_program and program:
-        program = (_number("number"), 0.0, *program)
-    spring, of_angle, said_of_angle = _native(
-        physics, OF_ANGLE, np.array((b**0, b, b**2, b**3)).T, ("b", b), spring, native_only=native_only
-    )
-    damping, of_rate, said_of_rate = _native(
-        physics, OF_RATE, np.array((r, np.abs(r) * r, r**3)).T, ("r", r), damping, law.damping,
-        native_only=native_only,
-    )  # fmt: skip
-    program = reduce(_added, (*of_angle, *of_rate), program)
-    differences += [*said_of_angle, *said_of_rate]
-    loads = _loads(problem, common, release) if physics.parameters.get("friction_load", 0.0) else ()
-    carried = Carried.over(physics.parameters, loads) if loads else Carried()
-    may_miss = np.inf if native_only else PATCHED_MISSES
-    friction = native_friction(physics.parameters, r[r > 0.0], law, float(damping[0]), may_miss, carried)
-    damping = damping + friction.damping
-    program = _added(program, friction.program)
-    differences += friction.differences
-    rest = law.rest + data.similarity.rest
-    units = ("N m", "N m/rad", "N m/rad2", "N m/rad3"), ("N m s/rad", "N m s2/rad2", "N m s3/rad3")
-    k0, k1, k2, k3 = (to_own_unit(float(v), unit) for v, unit in zip(spring, units[0], strict=True))
-    c0, c1, c2 = (to_own_unit(float(v), unit) for v, unit in zip(damping, units[1], strict=True))
-    patch = JointPatch(
-        inertia=to_own_unit(physics.yaw_inertia, "kg m2"),
-        spring=(k0, k1, k2, k3),
-        damping=(c0, c1, c2),
-        friction=to_own_unit(friction.loss, "N m"),
-        presliding=to_own_unit(friction.presliding, "rad"),
-        program=_own_program(program, rest, to_own_unit) if program else (),
-        contact=tuple(
-            (name, to_own_unit(value, unit) + (rest if name == "load_angle" else 0.0))
-            for name, value, unit in friction.contact
-        ),
-        actuator=actuator,
-        kp=None if kp is None else to_own_unit(kp, "N m/rad"),
-        noise=noise,
-    )
-    return FoundLaw(patch, (*differences, *_unwritten(physics, problem, actuator)))
-
-
-def _native(
-    physics: RunSettings,
-    terms: Sequence[tuple[str, str, str]],
-    columns: Array,
-    known: tuple[str, Array],
-    native: Array,
-    beside: float | None = None,
-    *,
-    native_only: bool,
-) -> tuple[Array, list[tuple[float, ...]], list[Fact]]:
-    """The polynomial of a spring or damper with the terms of a law that are near one.
-
-    Args:
-        terms: coefficient, words and formula of each.
-        columns: powers on a grid, shape (n, m).
-        known: the formulas' variable and its values on the grid, shape (n,).
-        native: the polynomial without the terms, shape (m,).
-        beside: damping of the joint as given, N m s/rad: no sum may be negative; None: any may be.
-        native_only: as in `found_law`.
-
-    Returns:
-        The polynomial, shape (m,), the programs of the other terms, and the differences.
-    """
-    constants = {"Kr": physics.spring_stiffness, **physics.parameters}
-    programs, differences = list[tuple[float, ...]](), list[Fact]()
-    for coefficient, words, text in terms:
-        if physics.parameters.get(coefficient, 0.0) == 0.0:
-            continue
-        formula = parse(text, _NAMES)
-        values = {
-            constant: constants.get(constant, 0.0) or TEXTBOOK_POWERS.get(constant, 0.0)
-            for constant in formula.names - {"b", "r"}
-        }
-        wanted = -formula.value({**values, known[0]: known[1]})
-        greatest, least = np.max(np.abs(wanted)), np.full(native.size, -np.inf)
-        if native_only and beside is not None:
-            least[0] = -(native[0] + beside)
-        found = nearest_polynomial(columns, wanted, least)
-        found[np.abs(found) * np.max(np.abs(columns), axis=0) < 1e-9 * greatest] = 0.0
-        missed = float(np.max(np.abs(columns @ found - wanted)) / greatest)
-        falls = beside is not None and native[0] + beside + found[0] < 0.0
-        if native_only or (missed < PATCHED_MISSES and not falls):
-            native = native + found
-            if missed >= 1e-6:
-                differences.append(Fact("polynomial", {"moment": words, "missed_percent": 100.0 * missed}))
-        else:
-            programs.append(formula.program(values, {"b": "angle", "r": "rate"}))
-            differences.append(Fact("no native element", {"moment": words}))
-    return native, programs, differences
-
-
-def _loads(problem: Problem, common: Array, release: Array) -> list[tuple[Array, Array]]:
-    """Every run's angle from rest, rad, and its actuator's moment, N m, each of shape (n,)."""
-    zero, found = problem.zero(common, release), list[tuple[Array, Array]]()
-    for run in problem.data.runs:
-        drive, moment = problem.chain(common, release, run).physics().drive, np.zeros(run.reading.size)
-        if drive is not None and drive.through_actuator:
-            acting = drive.acting
-            moment = acting.scale * np.interp(run.times - acting.delay, acting.time_s, acting.values)
-        found.append((run.reading - zero, moment))
-    return found
-
-
-def _unwritten(physics: RunSettings, problem: Problem, written: ActuatorPatch | None) -> list[Fact]:
-    """Differences of the patched model from the law found, and omissions.
-
-    Args:
-        written: changes of the actuator.
-    """
-    sensors = [kind.name for kind in problem.effects if kind.channel == "sensor"]
-    left_out = {
-        "rod": physics.rod_twist is not None,
-        "delayed input": written is None and any(issubclass(kind, InputClock) for kind in problem.effects),
-        "actuator": written is None and any(issubclass(kind, ActuatorEffect) for kind in problem.effects),
-        "air": problem.data.wind_on,
-    }
-    found = [Fact(kind) for kind, left in left_out.items() if left]
-    return [*found, Fact("sensor", {"effects": sensors})] if sensors else found
-
-
-def _added(program: tuple[float, ...], further: tuple[float, ...]) -> tuple[float, ...]:
-    """The program of the sum of two; either may be empty."""
-    return (*program, *further, _number("add")) if program and further else (*program, *further)
-
-
-def _number(operation: str) -> float:
-    return float(operation_names().index(operation))
-
-
-def _own_program(
-    program: tuple[float, ...], rest: float, own: Callable[[float, str], float]
-) -> tuple[float, ...]:
-    """A program of the similar campaign in terms of the model's joint: its position, rate, time and moment."""
-    value = _number("number")
-    replaced = {
-        _number("angle"): (value, rest, _number("subtract")),
-        _number("rate"): (value, 1.0 / own(1.0, "rad/s"), _number("multiply")),
-        _number("time"): (value, 1.0 / own(1.0, "s"), _number("multiply")),
-    }
-    code: list[float] = []
-    elements = iter(program)
-    for element in elements:
-        code.append(element)
-        if element == value:
-            code.append(next(elements))
-        code += replaced.get(element, ())
-    return (*code, value, own(1.0, "N m"), _number("multiply"))
-
+from tunnel_sim.vocabulary.rig import Actuator
 
 Simulate = Callable[[Array, Start, float], Motion]
 """From common parameters, a run's start and a duration (s) to a motion in the measured rig's units."""
@@ -414,6 +181,12 @@ def _start(problem: Problem, own: Array, index: int) -> Start:
     return Start(run.id, change.own(run.start, "s"), float(own[0]), change.own(float(own[1]), "rad/s"))
 
 
+def controlled(campaign: Campaign, actuator: Actuator | None) -> frozenset[str]:
+    """Ids of the runs whose input is the control of the model's actuator; the others' is a moment on the joint."""
+    runs = campaign.driven_by("drive") if actuator is not None else ()
+    return frozenset(run.id for run in runs)
+
+
 def refuse_unpatchable(model: JointModel, campaign: Campaign, path: Path) -> None:
     """Refuse a model that no answer about a campaign could be written into, before the diagnosis.
 
@@ -427,7 +200,7 @@ def refuse_unpatchable(model: JointModel, campaign: Campaign, path: Path) -> Non
             where="--patch",
             remedy="add runs with the wind off, or leave out --patch",
         )
-    spec, _ = patched(model, JointPatch(model.law.inertia, friction=model.law.friction))
+    spec, _ = patched(model, (Inertia(model.law.inertia), DryFriction(model.law.friction)))
     patched_xml(spec, model, path.parent)
     duration = max(float(np.ptp(run.record.time_s)) for run in still)
     simulate_joint(spec.compile(), model.law.rest, Start(still[0].id, 0.0, reach(campaign), 0.0), duration)
@@ -457,7 +230,7 @@ def patched_model(study: Study, model: JointModel) -> PatchedModel:
 def _written_model(
     study: Study, model: JointModel, nominal_out: HeldOut, chosen_out: HeldOut, *, native_only: bool = False
 ) -> tuple[PatchedModel, bool]:
-    """The model with the answer, and whether it needs the plugin; arguments of `native_closure` and `found_law`."""
+    """The model with the answer, and whether it needs the plugin; arguments of `native_closure` and `FittedLaw`."""
     chosen = study.chosen
     problem, change = chosen.problem, study.similarity
     noise = (
@@ -470,50 +243,40 @@ def _written_model(
     runs, actuator = controlled(study.campaign, model.law.actuator), model.law.actuator
     at = next((i for i, run in enumerate(problem.data.runs) if run.id in runs), None)
 
-    def actuated(common: Array) -> ActuatorPatch | None:
-        if actuator is None or at is None:
-            return None
-        return native_actuator(problem, common, chosen.point.per_run[at], at, actuator, change)
+    steps = None if given is None else partial(inertia_of_steps, given)
 
     def law(common: Array) -> FoundLaw:
-        release = chosen.point.per_run[still]
-        made = actuated(common)
-        identified = found_law(problem, common, release, noise, still, made, native_only=native_only)
-        if given is None:
-            return identified
-        steps = inertia_of_steps(given, float(given.dof_damping[0]) + identified.patch.damping[0])
-        return replace(identified, patch=replace(identified.patch, inertia=identified.patch.inertia - steps))
+        own = chosen.point.per_run
+        by = None if at is None else (own[at], at)
+        return FoundLaw.of(
+            FittedLaw(problem, common, own[still], still, noise, by, steps, native_only=native_only)
+        )
 
     @lru_cache(maxsize=4)
     def compiled(common: bytes) -> mujoco.MjModel:
-        return patched(model, law(np.frombuffer(common)).patch)[0].compile()
+        return patched(model, law(np.frombuffer(common)).elements)[0].compile()
 
     def simulate(common: Array, start: Start, duration: float) -> Motion:
         by = actuator.index if actuator is not None and start.run in runs else None
         return simulate_joint(compiled(common.tobytes()), model.law.rest, start, duration, by)
 
-    native = frozenset[str]() if actuated(chosen.point.common) is None else runs
-    closure = native_closure(study.nominal, chosen, nominal_out, chosen_out, simulate, native)
     identified = law(chosen.point.common)
-    differences = identified.differences
-    if identified.patch.friction > 0.0 and identified.patch.presliding == 0.0:
-        creep = creep_rate(compiled(chosen.point.common.tobytes()), model.law.rest)
-        if creep > 0.0:
-            unit = "m" if model.law.slide else "rad"
-            differences += (Fact("soft friction", {"below_per_s": creep, "unit": unit}),)
+    native = frozenset[str]() if identified.element(Control) is None else runs
+    closure = native_closure(study.nominal, chosen, nominal_out, chosen_out, simulate, native)
+    engine = compiled(chosen.point.common.tobytes())
+    rest, slide = model.law.rest, model.law.slide
+    limits = (fact for one in identified.elements for fact in one.limits(engine, rest, slide=slide))
+    differences = (*identified.differences, *limits)
     if given is not None and given.opt.integrator != int(mujoco.mjtIntegrator.mjINT_RK4):
         differences += (Fact("early steps", {"half_step_ms": 500.0 * given.opt.timestep}),)
-    if (made := identified.patch.actuator) is not None and made.delay > 0.0:
-        samples = history_of(made.delay, model.law.step)
-        differences += (Fact("delayed control", {"index": made.index, "samples": samples}),)
     own = list(chosen.point.per_run)
     if given is not None:  # the engine's steps and its input do not begin as those of the fit
         common = chosen.point.common
         own = [_restarted(chosen.problem, common, one, i, simulate, native)[0] for i, one in enumerate(own)]
     inputs = [run.moment(1.0) if run.id in runs else None for run in problem.data.runs]
     starts = [replace(_start(problem, one, i), drive=inputs[i]) for i, one in enumerate(own)]
-    spec, written = patched(model, identified.patch, starts)
+    spec, written = patched(model, identified.elements, starts)
     zeros = [problem.zero(chosen.point.common, own) for own in chosen.point.per_run]
     zero = float(np.median(zeros)) + change.rest - model.law.rest
     found = PatchedModel.of(EngineModel(model, spec, closure), written, differences, zero)
-    return found, identified.patch.by_plugin
+    return found, identified.by_plugin

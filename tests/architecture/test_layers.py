@@ -120,7 +120,8 @@ def test_mujoco_is_imported_only_where_the_engine_runs() -> None:
     # Inside functions, in a process of their own where they draw; live, the engine runs in front of the user.
     shown = {f"tunnel_lab.show.{name}" for name in ("film", "live")}
     # A model of one's own, with the causes written into it, is simulated by the engine itself.
-    assert outside <= shown | {"diagnosis.patch.written_model", "diagnosis.patch.patched_model"}
+    patch = {f"diagnosis.patch.{name}" for name in ("elements", "patched_model", "written_model")}
+    assert outside <= shown | patch
 
 
 def test_reading_and_identifying_a_campaign_never_imports_the_engine() -> None:

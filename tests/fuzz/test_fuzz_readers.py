@@ -180,8 +180,9 @@ def effects_file(folder: Path, draw: Draw) -> None:
 
 def model_file(folder: Path, draw: Draw) -> None:
     """A model of one's own changed, or what it includes; where its joint is accepted, it is patched."""
+    from diagnosis.patch.elements import DryFriction, Inertia
     from tunnel_sim.engine import joint_model
-    from tunnel_sim.engine.joint_patch import JointPatch, patched, patched_xml
+    from tunnel_sim.engine.joint_patch import patched, patched_xml
 
     files = {"model.xml": seeds.URDF} if draw(one_in(5)) else dict(seeds.MODEL_FILES)
     changed = draw(st.just("model.xml") | st.sampled_from(sorted(files)))
@@ -197,7 +198,7 @@ def model_file(folder: Path, draw: Draw) -> None:
     )
     with patch.object(joint_model, "in_sandbox", in_fork):
         found = joint_model.read_joint_model(folder / "model.xml", "hinge", recorded)
-    spec, _ = patched(found, JointPatch(found.law.inertia * draw(st.floats(0.5, 2.0)), friction=0.01))
+    spec, _ = patched(found, (Inertia(found.law.inertia * draw(st.floats(0.5, 2.0))), DryFriction(0.01)))
     patched_xml(spec, found, folder)
 
 

@@ -1,4 +1,4 @@
-"""Writing a joint's law into a user's model, as native elements and, where these do not suffice, the plugin."""
+"""A user's model with native elements written into it, and its motion in the engine."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import mujoco
 import numpy as np
@@ -22,64 +23,8 @@ from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, shown
 from tunnel_sim.vocabulary.rig import WrittenAttribute
 
-# the plugin wants them
-_AIR = ("air_density", "wind_speed", "frontal_area", "reference_length", "cn_beta", "cn_r")
 _SPARE = 2  # samples of a delayed control beyond the delay: both neighbours of a time between samples
 _SLOW = 1e-9  # rad/s: slower than any creep
-_NO_MOTOR = 1e-9  # N m/A: of a motor that is a friction alone; MuJoCo wants more than 0
-_STIFF_STEPS = 2.0  # time constant of frictionloss in steps: the shortest that MuJoCo accepts
-
-
-@dataclass(frozen=True)
-class ActuatorPatch:
-    """Elements between the control of an actuator and its moment.
-
-    MuJoCo delays the control, clips it and then filters it. The range of the control clips it before the filter,
-    and excludes the bias of a servo; ``forcerange`` would do neither.
-
-    Args:
-        limit: greatest control, in its own unit; 0: the model's own range.
-        lag: time constant of its filter, s; 0: none.
-        delay: of the control, s; 0: none.
-    """
-
-    index: int
-    limit: float = 0.0
-    lag: float = 0.0
-    delay: float = 0.0
-
-
-@dataclass(frozen=True)
-class JointPatch:
-    """The law to write, in SI units; moments are of the displacement b from rest and its rate.
-
-    Args:
-        inertia: the whole inertia about the joint, kg m².
-        spring: added restoring moment, the coefficients of 1, b, b² and b³, N m, N m/rad, N m/rad² and N m/rad³.
-        damping: added damping, the coefficients of ḃ, |ḃ|ḃ and ḃ³, N m s/rad, N m s²/rad² and N m s³/rad³.
-        friction: the whole moment of dry friction, N m.
-        presliding: deflection at which its contact slides, rad; 0: none.
-        program: of a further moment, for the plugin (``mjcf/plugin/expression.h``), in the joint's position.
-        kp: of the position servo that drives the joint, N m/rad; None: as in the model.
-        contact: numerics of the plugin's own friction, by name, N m and rad; empty: ``friction`` is all.
-        noise: standard deviation of the sensor's noise, rad; 0: not written.
-    """
-
-    inertia: float
-    spring: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
-    damping: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    friction: float = 0.0
-    presliding: float = 0.0
-    program: tuple[float, ...] = ()
-    contact: tuple[tuple[str, float], ...] = ()
-    actuator: ActuatorPatch | None = None
-    kp: float | None = None
-    noise: float = 0.0
-
-    @property
-    def by_plugin(self) -> bool:
-        """Whether MuJoCo's own elements do not suffice."""
-        return bool(self.program or self.contact)
 
 
 @dataclass(frozen=True)
@@ -99,111 +44,68 @@ class Start:
     drive: DriveMoment | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class Into:
+    """A model that elements are written into.
+
+    Args:
+        before: the given model, compiled.
+        inertia: about the joint, as written so far, kg m².
+        weight: share of the weight of the bodies that remains, a fraction.
+        states: number of written elements with a state.
+    """
+
+    given: JointModel
+    spec: mujoco.MjSpec
+    before: mujoco.MjModel
+    inertia: float
+    weight: float = 1.0
+    states: int = 0
+
+    @property
+    def joint(self) -> mujoco.MjsJoint:
+        """The recorded joint."""
+        return self.spec.joint(self.given.joint)
+
+
+class Element(Protocol):
+    """A part of a law that can be written into a model."""
+
+    def write(self, into: Into) -> Into:
+        """Write it."""
+
+    def begin(self, into: Into, key: mujoco.MjsKey, start: Start) -> None:
+        """Write its state at the start of a run into a key frame."""
+
+
 def patched(
-    model: JointModel, patch: JointPatch, starts: Sequence[Start] = ()
+    model: JointModel, elements: Sequence[Element], starts: Sequence[Start] = ()
 ) -> tuple[mujoco.MjSpec, tuple[WrittenAttribute, ...]]:
     """The model with a law written into it, its runs' starts as keyframes, and the written attributes."""
     spec = model.spec()
     before = spec.compile()
-    joint = spec.joint(model.joint)
-    joint.springdamper = (0.0, 0.0)  # stiffness and damping are written explicitly
-    weight = _write_inertia(spec, before, model, patch)
-    _write_spring(spec, before, model, patch, weight)
-    joint.damping = np.array([before.dof_damping[0], *before.dof_dampingpoly[0]]) + patch.damping
-    joint.damping[0] = max(joint.damping[0], 0.0)  # a damping fitted as 0 less the model's own, rounded
-    _write_friction(spec, before, model, patch)
-    if patch.actuator is not None:
-        _write_actuator(spec, patch.actuator)
-    if patch.kp is not None and model.law.actuator is not None:
-        servo, share = spec.actuators[model.law.actuator.index], -patch.kp / model.law.actuator.servo[1]
-        servo.gainprm[0] *= share
-        servo.biasprm[1] *= share
-    if patch.by_plugin:
-        if model.law.slide:
-            raise TunnelError("the plugin acts on hinges only", remedy="leave out --patch")
-        plugin = spec.add_plugin(name="tunnel", plugin_name="vwt.yaw_moment", active=True)
-        plugin.config = {"joint": model.joint}
-        spec.activate_plugin("vwt.yaw_moment")
-        for name in _AIR:
-            spec.add_numeric(name=name, data=[0.0], size=1)
-        for name, value in patch.contact:
-            spec.add_numeric(name=name, data=[value], size=1)
-        if patch.program:
-            spec.add_numeric(name="moment_program", data=list(patch.program), size=len(patch.program))
-    if patch.noise != 0.0:  # on the joint's position sensor, which is added if missing
-        kind = mujoco.mjtSensor.mjSENS_JOINTPOS
-        own = (one for one in spec.sensors if one.type == kind and one.objname == model.joint)
-        if (sensor := next(own, None)) is None:
-            joint_type = mujoco.mjtObj.mjOBJ_JOINT
-            sensor = spec.add_sensor(
-                name=f"{model.joint}_reading", type=kind, objtype=joint_type, objname=model.joint
-            )
-        sensor.noise = patch.noise
+    into = Into(model, spec, before, model.law.inertia)
+    into.joint.springdamper = (0.0, 0.0)  # stiffness and damping are written explicitly
+    for element in elements:
+        into = element.write(into)
     for start in starts:
         name = f"{start.run} at {start.time:.6g} s"
         if (known := spec.key(name)) is not None:
             spec.delete(known)
         key = spec.add_key(name=name, qpos=[model.law.rest + start.angle], qvel=[start.rate])
-        if patch.actuator is not None and start.drive is not None:
-            first = float(start.drive.values[0])
-            # no key frame holds the history of a delayed control: the note on it takes this control
-            key.ctrl = [first if i == patch.actuator.index else 0.0 for i in range(before.nu)]
-            if patch.actuator.lag > 0.0:
-                key.act = [first, *([0.0] if patch.presliding > 0.0 else [])]
+        for element in elements:
+            element.begin(into, key, start)
     with _refusals(model):
         after = spec.compile()
     old, new = _attributes(before), _attributes(after)
     spring = any(new["joint stiffness", "N m/rad, /rad2, /rad3"])
     return spec, tuple(
-        WrittenAttribute(name, before, value, unit)
+        WrittenAttribute(name, was, value, unit)
         for (name, unit), value in new.items()
         # an added actuator has no values before
-        if not np.allclose(value, before := old.get((name, unit), (0.0,) * len(value)), rtol=1e-9, atol=0.0)
+        if not np.allclose(value, was := old.get((name, unit), (0.0,) * len(value)), rtol=1e-9, atol=0.0)
         and (spring or name != "joint springref")
     )
-
-
-def _write_friction(
-    spec: mujoco.MjSpec, before: mujoco.MjModel, model: JointModel, patch: JointPatch
-) -> None:
-    """Friction as ``frictionloss``, or with presliding as that of a motor without a control.
-
-    MuJoCo has LuGre's friction in motors alone. Without a damping of its own and a rise near rest it is Dahl's. The
-    deflection is limited from below so that the oscillation of the contact is stable with the model's steps.
-    """
-    joint, friction = spec.joint(model.joint), patch.friction
-    joint.frictionloss = friction if patch.presliding == 0.0 else 0.0
-    if joint.frictionloss != before.dof_frictionloss[0]:
-        joint.solref_friction = (_STIFF_STEPS * spec.option.timestep, 1.0)
-    if patch.presliding == 0.0 or friction == 0.0:
-        return
-    actuator = spec.add_actuator()
-    actuator.name = f"{model.joint}_friction"
-    actuator.trntype, actuator.target = mujoco.mjtTrn.mjTRN_JOINT, model.joint
-    least = friction * spec.option.timestep**2 / (2.0 * patch.inertia)
-    stiffness = friction / max(patch.presliding, least)
-    actuator.set_to_dcmotor(
-        motorconst=(_NO_MOTOR, _NO_MOTOR), resistance=1.0, lugre=(stiffness, 0.0, friction, friction, 1.0),
-        ctrlspec=int(mujoco.mjtCtrlInput.mjINPUT_NONE),
-    )  # fmt: skip
-
-
-def _write_actuator(spec: mujoco.MjSpec, patch: ActuatorPatch) -> None:
-    """The limit of a control as its range, a lag as a filter, and a delay as a history of the control."""
-    actuator = spec.actuators[patch.index]
-    if patch.limit > 0.0:
-        low, high = (
-            actuator.ctrlrange if spec.compile().actuator_ctrllimited[patch.index] else (-np.inf, np.inf)
-        )
-        actuator.ctrllimited = mujoco.mjtLimited.mjLIMITED_TRUE
-        actuator.ctrlrange = np.array([max(low, -patch.limit), min(high, patch.limit)])
-    if patch.lag > 0.0:
-        actuator.dyntype = mujoco.mjtDyn.mjDYN_FILTEREXACT
-        actuator.dynprm[0] = patch.lag
-    if patch.delay > 0.0:
-        actuator.delay = patch.delay
-        actuator.nsample = history_of(patch.delay, spec.option.timestep)
-        actuator.interp = 1
 
 
 def history_of(delay: float, timestep: float) -> int:
@@ -228,44 +130,6 @@ def patched_xml(spec: mujoco.MjSpec, model: JointModel, folder: Path) -> str:
         return str(spec.to_xml())
 
 
-def _write_inertia(
-    spec: mujoco.MjSpec, before: mujoco.MjModel, model: JointModel, patch: JointPatch
-) -> float:
-    """Added inertia as armature; reduced inertia as a smaller armature, or as bodies drawn in towards the axis.
-
-    Bodies of a times the mass at 1/a times the distance from the axis have the same moment of gravity and 1/a times
-    the inertia. On a slide they lose mass instead; the result is the share of the weight that remains.
-    """
-    rotors = float(np.sum(before.actuator_gear[:, 0] ** 2 * before.actuator_armature))  # they are unchanged
-    armature = float(before.dof_armature[0]) + patch.inertia - model.law.inertia
-    if armature >= 0.0:
-        spec.joint(model.joint).armature = armature
-        return 1.0
-    spec.joint(model.joint).armature = 0.0
-    share = (patch.inertia - rotors) / (model.law.inertia - float(before.dof_armature[0]) - rotors)
-    if not share > 0.0:
-        what = f"the inertia found, {patch.inertia:.4g} kg m2, is less than that of the actuators' rotors"
-        raise TunnelError(what, remedy="correct the armature of the actuators")
-    data = mujoco.MjData(before)
-    mujoco.mj_forward(before, data)
-    axis, anchor = data.xaxis[0], data.xanchor[0]
-    for body in spec.bodies:
-        number = body.id
-        if before.body_weldid[number] == 0 or before.body_mass[number] == 0.0:
-            continue
-        centre = data.xipos[number] - anchor
-        along = axis * float(axis @ centre)
-        across = (centre - along) * (1.0 if model.law.slide else share)
-        moved = anchor + along + across - data.xpos[number]
-        body.explicitinertial = True
-        body.mass = float(before.body_mass[number]) * (share if model.law.slide else 1.0 / share)
-        body.inertia = before.body_inertia[number] * share
-        body.ipos = data.xmat[number].reshape(3, 3).T @ moved
-        body.iquat = before.body_iquat[number]
-        body.fullinertia = np.full(6, np.nan)
-    return share if model.law.slide else 1.0
-
-
 def inertia_of_steps(model: mujoco.MjModel, damping: float) -> float:
     """Apparent additional inertia of a joint due to simulation in steps, kg m².
 
@@ -273,9 +137,10 @@ def inertia_of_steps(model: mujoco.MjModel, damping: float) -> float:
     middle: this adds C h/2 to the inertia, or subtracts it.
 
     Args:
-        damping: of the joint itself, N m s/rad; the damping of its actuators is taken from the model.
+        damping: of the joint, added to that of the model, N m s/rad.
     """
     options, kinds = model.opt, mujoco.mjtIntegrator
+    damping = float(model.dof_damping[0]) + damping
     if options.integrator == int(kinds.mjINT_RK4):
         return 0.0
     affine = model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE)
@@ -303,44 +168,6 @@ def creep_rate(model: mujoco.MjModel, rest: float) -> float:
         forces.append(float(data.qfrc_constraint[0]))
     rise = forces[0] - forces[1]
     return float(model.dof_frictionloss[0]) * _SLOW / rise if rise > 0.0 else 0.0
-
-
-def _write_spring(
-    spec: mujoco.MjSpec, before: mujoco.MjModel, model: JointModel, patch: JointPatch, weight: float
-) -> None:
-    """The sum of the joint's own spring and the added one, about the position at which it vanishes."""
-    spring = np.polynomial.Polynomial([0.0, before.jnt_stiffness[0], *before.jnt_stiffnesspoly[0]])
-    offset = model.law.rest - float(before.qpos_spring[0])
-    total = spring(np.polynomial.Polynomial([offset, 1.0])) + np.polynomial.Polynomial(patch.spring)
-    total -= (1.0 - weight) * spring(offset)  # the spring carries the weight
-    total = total.trim(1e-12 * float(np.max(np.abs(total.coef))))
-    if not total.degree():
-        moment, own_actuator = -float(total.coef[0]), model.law.actuator
-        if moment == 0.0:
-            return
-        # a constant moment is the bias of the actuator that drives the joint, or of an added one
-        if own_actuator is None:
-            name, kind = f"{model.joint}_moment", mujoco.mjtTrn.mjTRN_JOINT
-            actuator = spec.add_actuator(name=name, trntype=kind, target=model.joint)
-            actuator.gainprm[0] = 0.0
-        else:
-            actuator = spec.actuators[own_actuator.index]
-        if actuator.biastype == mujoco.mjtBias.mjBIAS_NONE:
-            actuator.biastype, actuator.biasprm[:] = mujoco.mjtBias.mjBIAS_AFFINE, 0.0
-        actuator.biasprm[0] += moment / actuator.gear[0]
-        return
-    roots = total.roots()
-    real = roots.real[np.abs(roots.imag) < 1e-6]
-    if real.size == 0:
-        remedy = "add a spring to the joint"
-        raise TunnelError("the patched model would have no rest position", remedy=remedy)
-    usual = -offset if np.any(spring.coef) else 0.0
-    zero = float(real[np.argmin(np.abs(real - usual))])
-    about = total(np.polynomial.Polynomial([zero, 1.0])).coef
-    joint = spec.joint(model.joint)
-    joint.stiffness = np.array([*about[1:], 0.0, 0.0, 0.0])[:3]
-    place = model.law.rest + zero
-    joint.springref = math.degrees(place) if spec.compiler.degree and not model.law.slide else place
 
 
 def _attributes(model: mujoco.MjModel) -> dict[tuple[str, str], tuple[float, ...]]:

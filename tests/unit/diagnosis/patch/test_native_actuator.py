@@ -15,15 +15,14 @@ from diagnosis.model.blocks import prepare
 from diagnosis.model.fact import Fact
 from diagnosis.model.joint import with_law
 from diagnosis.model.similar import similar_campaign
-from diagnosis.patch.native_actuator import controlled, native_actuator
-from diagnosis.patch.patched_model import found_law
+from diagnosis.patch.elements import Control, FoundLaw
+from diagnosis.patch.fitted_law import FittedLaw
+from diagnosis.patch.patched_model import controlled
 from tests.reference.robot_joints import MOTOR, NOISE, TIME, multisine, robot, robot_campaign
 from tests.support.robots import own_model
 from tunnel_sim.effects import effect_class
 from tunnel_sim.engine.joint_model import JointModel
 from tunnel_sim.engine.joint_patch import (
-    ActuatorPatch,
-    JointPatch,
     Start,
     history_of,
     patched,
@@ -46,8 +45,8 @@ def swung() -> Campaign:
     return robot_campaign(robot(TRUE))
 
 
-def moved(model: JointModel, patch: ActuatorPatch | None, drive: DriveMoment) -> Motion:
-    spec, _ = patched(model, JointPatch(model.law.inertia, actuator=patch))
+def moved(model: JointModel, patch: Control | None, drive: DriveMoment) -> Motion:
+    spec, _ = patched(model, [patch] if patch else [])
     return simulate_joint(spec.compile(), model.law.rest, Start("r1", 0.0, 0.0, 0.0, drive), 4.0, 0)
 
 
@@ -76,7 +75,7 @@ def test_a_native_actuator_moves_the_joint_as_its_law(
     assert model.law.actuator is not None
     gain = model.law.actuator.gain
     asked = DriveMoment(TIME, multisine(3, 6.0 / gain), gain)
-    patch = ActuatorPatch(0, made.limit / gain, made.lag, delay)
+    patch = Control(0, made.limit / gain, made.lag, delay)
     native, plain = moved(model, patch, asked), moved(model, None, asked)
     law = moved(model, None, replace(asked, actuator=made, delay=delay).acting)
     size = np.max(np.abs(law.angle - plain.angle))
@@ -94,7 +93,7 @@ def test_a_delay_replays_from_a_key_frame_with_the_history_that_its_note_fills(
     assert model.law.actuator is not None
     drive = DriveMoment(TIME, 0.2 + multisine(3, 0.3), model.law.actuator.gain)
     start = Start("r1", 0.0, 0.1, 0.5, drive)
-    patch = JointPatch(model.law.inertia, actuator=ActuatorPatch(0, lag=0.02, delay=0.0125))
+    patch = [Control(0, lag=0.02, delay=0.0125)]
     engine = mujoco.MjModel.from_xml_string(patched_xml(patched(model, patch, [start])[0], model, tmp_path))
     wanted = simulate_joint(engine, model.law.rest, start, 0.5, 0).angle
 
@@ -121,7 +120,7 @@ def test_a_delay_replays_from_a_key_frame_with_the_history_that_its_note_fills(
 
 def test_what_is_written_is_read_by_mujoco_and_stated(tmp_path: Path, swung: Campaign) -> None:
     model = own_model(tmp_path, swung, robot(TRUE))
-    spec, written = patched(model, JointPatch(model.law.inertia, actuator=ActuatorPatch(0, 0.5, 0.02, 0.013)))
+    spec, written = patched(model, [Control(0, 0.5, 0.02, 0.013)])
     engine = mujoco.MjModel.from_xml_string(patched_xml(spec, model, tmp_path))
     assert engine.actuator_ctrlrange[0] == pytest.approx([-0.5, 0.5])
     assert engine.actuator_dynprm[0, 0] == pytest.approx(0.02)
@@ -157,8 +156,9 @@ def test_what_a_fit_found_of_the_actuator_is_written_in_the_units_of_the_rig(
     common, own = np.zeros(len(problem.names)), np.zeros(len(problem.parameters.own))
     common[problem.names.index("yaw_inertia")] = 1.0
     assert model.law.actuator is not None
-    patch = native_actuator(problem, common, own, 0, model.law.actuator, change)
-    said = {one.kind for one in found_law(problem, common, own, 0.0, 0, patch).differences}
+    law = FittedLaw(problem, common, own, controlled=(own, 0))
+    patch = Control.fit(law)
+    said = {one.kind for one in FoundLaw.of(law).differences}
     if expected is None:
         assert patch is None
         assert bool(said & {"actuator", "delayed input"}) == any(kind.driven for kind in kinds)
@@ -167,7 +167,7 @@ def test_what_a_fit_found_of_the_actuator_is_written_in_the_units_of_the_rig(
         prepared, kinds, (*fixed, ("actuator_saturation.softness", 0.4)), ("actuator_saturation.softness",)
     )
     if "actuator_saturation" in values:  # a control range is hard
-        assert native_actuator(soft, common, own, 0, model.law.actuator, change) is None
+        assert Control.fit(replace(law, problem=soft)) is None
     assert patch is not None
     limit, lag, delay = expected
     assert (patch.limit * model.law.actuator.gain, patch.lag, patch.delay) == pytest.approx(

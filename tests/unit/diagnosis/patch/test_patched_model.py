@@ -14,7 +14,9 @@ from diagnosis.model.blocks import prepare
 from diagnosis.model.joint import with_law
 from diagnosis.model.parameters import Point
 from diagnosis.model.similar import similar_campaign
-from diagnosis.patch.patched_model import engine_residual, found_law
+from diagnosis.patch.elements import DryFriction, FoundLaw
+from diagnosis.patch.fitted_law import FittedLaw
+from diagnosis.patch.patched_model import engine_residual
 from tunnel_sim.effects import Effect, effect_class
 from tunnel_sim.effects.expression_effect import ExpressionParameter, expression_effect
 from tunnel_sim.engine.joint_patch import Start, patched, simulate_joint
@@ -94,14 +96,14 @@ def test_the_patched_model_moves_as_the_fit_does(
     }
     common = np.array([at.get(key, 0.0) for key in problem.names])
     own = np.array([1.1, 0.2])
-    patch = found_law(problem, common, own, 0.0)
+    patch = FoundLaw.of(FittedLaw(problem, common, own))
     kinds = {one.kind for one in patch.differences}
     assert said in kinds if said else kinds.isdisjoint({"no native element", "polynomial"})
-    nearest = found_law(problem, common, own, 0.0, native_only=True)
-    assert not nearest.patch.by_plugin
+    nearest = FoundLaw.of(FittedLaw(problem, common, own, native_only=True))
+    assert not nearest.by_plugin
     assert {one.kind for one in nearest.differences}.isdisjoint({"no native element"})
-    assert patch.patch.by_plugin or nearest == patch  # what is native already stays as it is
-    compiled = patched(model, patch.patch)[0].compile()
+    assert patch.by_plugin or nearest == patch  # what is native already stays as it is
+    compiled = patched(model, patch.elements)[0].compile()
 
     def simulate(common: Array, start: Start, duration: float) -> Motion:
         del common
@@ -122,5 +124,5 @@ def test_the_models_own_friction_is_part_of_the_nominal_model(tmp_path: Path) ->
     similar, change = similar_campaign(stated, joint)
     joint = joint.of(stated).similar(change)
     prepared = prepare(similar, {"r1": NOISE**2}, change, model=joint)
-    patch = found_law(Problem(prepared), np.array([0.1, 0.02, 0.0]), np.array([1.1, 0.0]), 0.0).patch
-    assert patch.friction == pytest.approx(0.05)
+    law = FittedLaw(Problem(prepared), np.array([0.1, 0.02, 0.0]), np.array([1.1, 0.0]))
+    assert DryFriction.fit(law).moment == pytest.approx(0.05)

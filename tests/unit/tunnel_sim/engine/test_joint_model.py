@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
 
+from diagnosis.patch.elements import Damper, DryFriction, Inertia, PluginMoment, Spring
 from tunnel_sim.engine import joint_model
 from tunnel_sim.engine.joint_model import JointModel, Recorded, read_joint_model
-from tunnel_sim.engine.joint_patch import JointPatch, Start, patched, patched_xml, simulate_joint
+from tunnel_sim.engine.joint_patch import Element, Start, patched, patched_xml, simulate_joint
 from tunnel_sim.physics.expression import parse
 from tunnel_sim.sandbox import in_sandbox
 from tunnel_sim.vocabulary import limits
@@ -161,8 +161,8 @@ def test_a_spring_of_tendons_is_refused(tmp_path: Path) -> None:
         read_joint_model(path, "hinge", Recorded(1.0))
 
 
-def reread(found: JointModel, patch: JointPatch, folder: Path) -> JointModel:
-    spec, _ = patched(found, patch)
+def reread(found: JointModel, folder: Path, *elements: Element) -> JointModel:
+    spec, _ = patched(found, elements)
     path = folder / "out.xml"
     path.write_text(patched_xml(spec, found, folder))
     assert 'armature="-' not in path.read_text()
@@ -172,7 +172,7 @@ def reread(found: JointModel, patch: JointPatch, folder: Path) -> JointModel:
 @pytest.mark.parametrize("share", [0.6, 0.98, 1.3])
 def test_the_inertia_written_leaves_gravity_as_it_is(tmp_path: Path, share: float) -> None:
     found = model(tmp_path, 'pos="0 0.1 0.05"')
-    law = reread(found, JointPatch(share * found.law.inertia), tmp_path).law
+    law = reread(found, tmp_path, Inertia(share * found.law.inertia)).law
     assert law.inertia == pytest.approx(share * found.law.inertia, rel=1e-5)
     assert law.stiffness == pytest.approx(found.law.stiffness, rel=1e-5)
 
@@ -181,15 +181,15 @@ def test_the_inertia_written_leaves_gravity_as_it_is(tmp_path: Path, share: floa
 def test_a_slide_keeps_its_place_as_its_inertia_changes(tmp_path: Path, share: float) -> None:
     body = '<body><joint name="hinge" type="slide" axis="0 0 1" {}/>{}</body>'
     found = model(tmp_path, 'stiffness="50 0 900" springref="0.02"', body=body, reach=0.05)
-    law = reread(found, JointPatch(share * found.law.inertia), tmp_path).law
+    law = reread(found, tmp_path, Inertia(share * found.law.inertia), Spring()).law
     assert (law.inertia, law.rest) == pytest.approx((share * found.law.inertia, found.law.rest), rel=1e-5)
     assert law.stiffness == pytest.approx(found.law.stiffness, rel=1e-4)
 
 
 def test_springs_and_dampers_are_added_to_those_of_the_model(tmp_path: Path) -> None:
     found = model(tmp_path, 'stiffness="2 0 0.4" springref="0.5" damping="0.01"')
-    added = JointPatch(found.law.inertia, (0.0, 0.3, 0.2, 0.1), (0.02, 0.03, 0.0), friction=0.004)
-    new = reread(found, added, tmp_path)
+    added = Spring((0.0, 0.3, 0.2, 0.1)), Damper((0.02, 0.03, 0.0)), DryFriction(0.004)
+    new = reread(found, tmp_path, *added)
     assert new.law.rest == pytest.approx(found.law.rest, abs=1e-5)
     assert new.law.stiffness == pytest.approx(found.law.stiffness + 0.3, rel=1e-5)
     before, after = terms(found), terms(new)
@@ -206,7 +206,7 @@ def test_degrees_stay_degrees(tmp_path: Path) -> None:
     (tmp_path / "model.xml").write_text(text)
     found = read_joint_model(tmp_path / "model.xml", "hinge", Recorded(1.0))
     assert found.law.rest == pytest.approx(math.radians(30.0))
-    new = reread(found, JointPatch(found.law.inertia, (0.0, 0.5, 0.0, 0.0)), tmp_path)
+    new = reread(found, tmp_path, Spring((0.0, 0.5, 0.0, 0.0)))
     assert new.law.rest == pytest.approx(math.radians(30.0), abs=1e-5)
 
 
@@ -214,7 +214,7 @@ def test_a_moment_without_a_native_element_is_a_program_of_the_plugin(tmp_path: 
     found = model(tmp_path, 'ref="0.3"')
     formula = parse("-0.5*abs(b-0.3)*sin(3*b)-0.1*r", frozenset("br"))
     program = formula.program({}, {"b": "angle", "r": "rate"})
-    spec, written = patched(found, JointPatch(found.law.inertia, program=program))
+    spec, written = patched(found, [PluginMoment(program)])
     assert [w.name for w in written] == ["plugin vwt.yaw_moment"]
     (tmp_path / "out.xml").write_text(patched_xml(spec, found, tmp_path))
     engine = mujoco.MjModel.from_xml_path(str(tmp_path / "out.xml"))
@@ -228,7 +228,8 @@ def test_the_patched_model_moves_as_the_law_says(tmp_path: Path) -> None:
     from scipy.integrate import solve_ivp
 
     found = model(tmp_path, 'ref="0.3"', option='integrator="RK4" timestep="0.001"')
-    patch = JointPatch(1.1 * found.law.inertia, (0.0, 0.4, 0.1, 0.2), (0.002, 0.003, 0.0))
+    inertia = 1.1 * found.law.inertia
+    patch = Inertia(inertia), Spring((0.0, 0.4, 0.1, 0.2)), Damper((0.002, 0.003, 0.0))
     spec, _ = patched(found, patch, [Start("r1", 0.0, 1.2, -0.5)])
     motion = simulate_joint(spec.compile(), found.law.rest, Start("r1", 0.0, 1.2, -0.5), 3.0)
     weight = MASS * G * LENGTH
@@ -236,7 +237,7 @@ def test_the_patched_model_moves_as_the_law_says(tmp_path: Path) -> None:
     def slope(_: float, state: np.ndarray) -> tuple[float, float]:
         b, r = state
         moment = -weight * math.sin(b) - 0.4 * b - 0.1 * b**2 - 0.2 * b**3 - 0.002 * r - 0.003 * abs(r) * r
-        return r, moment / patch.inertia
+        return r, moment / inertia
 
     exact = solve_ivp(
         slope, (0.0, 3.0), (1.2, -0.5), "DOP853", motion.time_s[motion.time_s <= 3.0], rtol=1e-10
@@ -256,7 +257,7 @@ def test_meshes_are_found_from_another_folder(tmp_path: Path) -> None:
         '<joint name="hinge" axis="0 1 0"/><geom type="mesh" mesh="arm"/></body></worldbody></mujoco>'
     )
     found = read_joint_model(tmp_path / "in" / "model.xml", "hinge", Recorded(1.0))
-    spec, _ = patched(found, replace(JointPatch(found.law.inertia), friction=0.1))
+    spec, _ = patched(found, [DryFriction(0.1)])
     (tmp_path / "out" / "out.xml").write_text(patched_xml(spec, found, tmp_path / "out"))
     law = read_joint_model(
         tmp_path / "out" / "out.xml", "hinge", Recorded(1.0), asset_dir=tmp_path / "in"

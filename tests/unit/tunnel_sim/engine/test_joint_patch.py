@@ -7,16 +7,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from diagnosis.patch.elements import Control, DryFriction, Spring
 from tunnel_sim.engine.joint_model import Recorded, read_joint_model
-from tunnel_sim.engine.joint_patch import (
-    ActuatorPatch,
-    JointPatch,
-    Start,
-    creep_rate,
-    patched,
-    patched_xml,
-    simulate_joint,
-)
+from tunnel_sim.engine.joint_patch import Start, creep_rate, patched, patched_xml, simulate_joint
 from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.vocabulary.record import Array
 
@@ -58,12 +51,9 @@ def test_presliding_friction_is_native(tmp_path: Path, kind: str, integrator: st
     gravity = '<option gravity="0 0 0"/>'
     path.write_text(SWUNG.format(integrator, kind).replace("<worldbody>", gravity + "<worldbody>"))
     model = read_joint_model(path, "elbow", Recorded(0.5))
-    patch = JointPatch(
-        model.law.inertia, friction=MOMENT, presliding=RANGE, actuator=ActuatorPatch(0, lag=0.01)
-    )
+    patch = [DryFriction(MOMENT, RANGE), Control(0, lag=0.01)]
     drive = DriveMoment(np.array([0.0, END]), np.zeros(2))
     spec, written = patched(model, patch, [Start("r1", 0.0, 0.5, 0.0, drive)])
-    assert not patch.by_plugin
     assert {one.name: one.after for one in written} == {
         "actuator motor time constant": (0.01,),
         "dcmotor lugre friction": (MOMENT,),
@@ -86,7 +76,7 @@ def test_a_constant_moment_without_an_actuator_is_the_bias_of_an_added_one(tmp_p
 <geom type="sphere" size="0.05" mass="0.2"/></body></worldbody></mujoco>"""
     )
     model = read_joint_model(path, "elbow", Recorded(0.5, 0.0))
-    spec, written = patched(model, JointPatch(model.law.inertia, (0.1, 0.0, 0.0, 0.0)))
+    spec, written = patched(model, [Spring((0.1, 0.0, 0.0, 0.0))])
     (one,) = written
     assert (one.name, one.before) == ("actuator moment without control", (0.0,))
     assert one.after == pytest.approx((-0.1,))
