@@ -16,7 +16,7 @@ from diagnosis.model.rig import SpringModel
 from diagnosis.model.run_data import PreparedRuns, RunData
 from diagnosis.model.servo import OF_GEAR
 from diagnosis.model.similarity import Similarity, frequency
-from diagnosis.model.starts import InputResponse, Shown
+from diagnosis.model.starts import Shown, ShownResponse
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.capabilities import Backlash
 from tunnel_sim.effects.parameters import ParameterInfo
@@ -185,7 +185,7 @@ class Joint(_OfLaw, SpringModel):
     def _driven_start(self, data: PreparedRuns) -> FitStart:
         """The readings count as positions of the joint."""
         law = self.law
-        found = filter(None, map(InputResponse.of, data.runs))
+        found = filter(None, map(ShownResponse.of, data.runs))
         shown = [(one.inertia, one.rate) for one in found if one.scale * one.gain > 0.0]
         inertia, loss = np.median(shown, axis=0).tolist() if shown else (law.inertia, 0.0)
         damping = max(2.0 * loss * inertia, law.damping)

@@ -17,7 +17,7 @@ from diagnosis.model.similarity import (
     REFERENCE_STIFFNESS,
     response_to_input,
 )
-from diagnosis.model.starts import InputResponse
+from diagnosis.model.starts import ShownResponse
 from tunnel_sim.effects import BetweenRuns, Effect
 from tunnel_sim.effects.parameters import SWING, ParameterInfo
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -93,7 +93,7 @@ class LooseBody(NominalModel):
 
     def starts(self, data: PreparedRuns) -> Iterator[FitStart]:
         """Inertia and damping by the response to known moments, and no other moment."""
-        shown = filter(None, map(InputResponse.of, data.runs))
+        shown = filter(None, map(ShownResponse.of, data.runs))
         found = [(response.inertia, 2.0 * response.rate) for response in shown]
         inertia, loss = np.median(found or [(REFERENCE_INERTIA, 0.0)], axis=0).tolist()
         own = [

@@ -16,7 +16,7 @@ from diagnosis.model.nominal import FitStart, NominalModel
 from diagnosis.model.rig import PerInertia, SpringModel
 from diagnosis.model.run_data import PreparedRuns, RunData
 from diagnosis.model.similarity import Similarity
-from diagnosis.model.starts import InputResponse
+from diagnosis.model.starts import ShownResponse
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.capabilities import Backlash
 from tunnel_sim.physics.settings_table import SettingsTable
@@ -131,7 +131,7 @@ class Servo(_OfServo, SpringModel):
         shown = [
             (run.spring_stiffness / response.stiffness, 2.0 * response.rate)
             for run in data.runs
-            if (response := InputResponse.of(run)) is not None and run.spring_stiffness is not None
+            if (response := ShownResponse.of(run)) is not None and run.spring_stiffness is not None
         ]
         if shown and not self.own_zeros:
             inertia, loss = np.median(shown, axis=0).tolist()

@@ -50,7 +50,7 @@ class Shown:
             squares: squared frequencies of the runs, 1/s²; None: from their spectra, and for driven runs from the
                 resonance between input and motion.
         """
-        driven = [InputResponse.of(run) for run in data.runs]
+        driven = [ShownResponse.of(run) for run in data.runs]
         if squares is None:
             squares = [
                 _by_spectrum(run) if response is None else response.stiffness
@@ -93,7 +93,7 @@ def decay_squares(data: PreparedRuns) -> list[float] | None:
 
 
 @dataclass(frozen=True)
-class InputResponse:
+class ShownResponse:
     """The response of a run to its input.
 
     Args:
@@ -109,7 +109,7 @@ class InputResponse:
     scale: float
 
     @classmethod
-    def of(cls, run: RunData) -> InputResponse | None:
+    def of(cls, run: RunData) -> ShownResponse | None:
         """The response of a run; None where it has no input or shows no resonance.
 
         Of a body without a spring the gain must be positive, in N m of the input.
