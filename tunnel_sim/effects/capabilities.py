@@ -185,22 +185,6 @@ class ReadingEffect(Effect):
         del time_s, stated, drawn
         return angle
 
-    def oscillation(
-        self, time_s: Array, stated: RunSettings, drawn: Drawn, derivative: int = 0
-    ) -> Array | None:
-        """An oscillation in the reading besides the body's.
-
-        Args:
-            time_s: true times since the release, s, shape (n,).
-            stated: the input of a driven run is the acting one.
-            derivative: which derivative of the angle the sensor measures: 0, 1 or 2.
-
-        Returns:
-            rad, rad/s or rad/s², shape (n,), to be added to the angle or its derivative; None: none.
-        """
-        del time_s, stated, drawn, derivative
-        return None
-
     def on_sensor(self, sensor: SensorModel) -> SensorModel:
         """Change the sensor itself."""
         return sensor
@@ -227,6 +211,19 @@ class SecondOscillation(Periodic, ReadingEffect):
     """
 
     resembles: ClassVar[tuple[Channel, ...]] = ()
+
+    @abstractmethod
+    def oscillation(self, time_s: Array, stated: RunSettings, drawn: Drawn, derivative: int = 0) -> Array:
+        """The oscillation in the reading besides the body's.
+
+        Args:
+            time_s: true times since the release, s, shape (n,).
+            stated: the input of a driven run is the acting one.
+            derivative: which derivative of the angle the sensor measures: 0, 1 or 2.
+
+        Returns:
+            rad, rad/s or rad/s², shape (n,), to be added to the angle or its derivative.
+        """
 
 
 @dataclass(frozen=True)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 
 from tunnel_sim.effects.base import Drawn, Effect
-from tunnel_sim.effects.capabilities import Clock, ReadingEffect
+from tunnel_sim.effects.capabilities import Clock, ReadingEffect, SecondOscillation
 from tunnel_sim.physics.run_settings import Motion, RunSettings
 from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Array, Record
@@ -40,7 +41,7 @@ class EffectChain:
         """
         motion, sensor = rng.spawn(len(effects)), rng.spawn(len(effects))
         drawn = tuple(
-            effect.draw(stated, of_sensor if _overrides(effect, *_SEEN) else of_motion)
+            effect.draw(stated, of_sensor if _of_angle(effect) else of_motion)
             for effect, of_motion, of_sensor in zip(effects, motion, sensor, strict=True)
         )
         return cls(stated, tuple(effects), drawn)
@@ -110,13 +111,13 @@ class EffectChain:
             for effect, drawn in zip(self.effects, self.drawn, strict=True)
             if isinstance(effect, ReadingEffect)
         ]
-        swings = any(type(effect).oscillation is not ReadingEffect.oscillation for effect, _ in seen_by)
+        swings = any(isinstance(effect, SecondOscillation) for effect, _ in seen_by)
         if swings and stated.drive is not None:  # with its delay and its actuator
             stated = replace(stated, drive=self.physics().drive)
         for effect, drawn in seen_by:
-            beside = effect.oscillation(time_s, stated, drawn, derivative)
-            seen = angle if beside is None else angle + beside
-            angle = effect.on_angle(seen, time_s, self.stated, drawn)
+            if isinstance(effect, SecondOscillation) and not effect.is_null:
+                angle = angle + effect.oscillation(time_s, stated, drawn, derivative)
+            angle = effect.on_angle(angle, time_s, self.stated, drawn)
         return angle
 
     def sensor(self, sensor: SensorModel) -> SensorModel:
@@ -147,19 +148,19 @@ class EffectChain:
 def reads_plainly(effects: Sequence[Effect]) -> bool:
     """Whether none of some effects changes the measured angle or the reading."""
     return not any(
-        isinstance(effect, Clock) or _overrides(effect, *_SEEN, "on_reading") for effect in effects
+        isinstance(effect, Clock) or _of_angle(effect) or _overrides(effect, "on_reading")
+        for effect in effects
     )
 
 
-_SEEN = ("oscillation", "on_angle")
+def _of_angle(effect: Effect) -> bool:
+    """Whether an effect changes the angle that the sensor measures."""
+    return isinstance(effect, SecondOscillation) or _overrides(effect, "on_angle")
 
 
-def _overrides(effect: Effect, *hooks: str) -> bool:
-    """Whether an effect on the reading overrides one of some hooks."""
+def _overrides(effect: Effect, hook: Literal["on_angle", "on_reading"]) -> bool:
     kind = type(effect)
-    return issubclass(kind, ReadingEffect) and any(
-        getattr(kind, hook) is not getattr(ReadingEffect, hook) for hook in hooks
-    )
+    return issubclass(kind, ReadingEffect) and getattr(kind, hook) is not getattr(ReadingEffect, hook)
 
 
 def read_motion(

@@ -21,6 +21,7 @@ from tunnel_sim.effects.capabilities import (
     OutOfPhase,
     OwnNumbers,
     ReadingEffect,
+    SecondOscillation,
 )
 from tunnel_sim.effects.traits import Channel, Condition
 from tunnel_sim.vocabulary.dimensions import dimension
@@ -40,7 +41,16 @@ _under_way: ContextVar[tuple[type[Effect], ...]] = ContextVar(
 )
 
 _OF_SPECTRUM = 2  # parameters of a random moment
-_CAPABILITIES = (BetweenRuns, OwnNumbers, Clock, ReadingEffect, AtRandom, Friction, OutOfPhase)
+_CAPABILITIES = (
+    BetweenRuns,
+    OwnNumbers,
+    Clock,
+    ReadingEffect,
+    SecondOscillation,
+    AtRandom,
+    Friction,
+    OutOfPhase,
+)
 
 
 def check_described(kind: object) -> None:

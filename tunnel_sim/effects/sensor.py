@@ -419,12 +419,8 @@ class SecondMode(SecondOscillation):
         shown = self.frequency * duration >= 2.0 * np.pi * _LEAST_CYCLES
         return decays and lasts and apart and shown
 
-    def oscillation(
-        self, time_s: Array, stated: RunSettings, drawn: Drawn, derivative: int = 0
-    ) -> Array | None:
+    def oscillation(self, time_s: Array, stated: RunSettings, drawn: Drawn, derivative: int = 0) -> Array:
         """The second oscillation, at the run's own phase or as excited by the input."""
-        if self.is_null:
-            return None
         if stated.drive is None or self.by_input == 0.0:
             return self._ringing(time_s, stated, drawn, derivative)
         mode = self.frequency, self.damping_ratio
