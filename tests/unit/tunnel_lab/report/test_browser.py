@@ -424,15 +424,17 @@ def test_the_pdf_is_a_file_of_two_pages_for_both_papers(
 PHONE = """() => {
   const top = (what) => document.querySelector(what).getBoundingClientRect().top + scrollY;
   const letters = [...document.querySelectorAll("#head dd")].map((one) => getComputedStyle(one).fontSize);
-  return [top("#fit"), top("#coefficients-section"), Math.min(...letters.map(parseFloat))];
+  return [...["#fit", "#coefficients-section", "#next", "#closes"].map(top), Math.min(...letters.map(parseFloat))];
 }"""
 
 
 @pytest.mark.parametrize("opened", WIDTHS[:1], indirect=True)
-def test_on_a_phone_the_answer_fills_the_first_screen_in_large_letters(opened: Opened) -> None:
-    fit, coefficients, least = opened.page.evaluate(PHONE)
+def test_on_a_phone_the_answer_fills_the_first_screen_in_large_letters_and_the_second_has_the_steps(
+    opened: Opened,
+) -> None:
+    fit, coefficients, steps, closes, least = opened.page.evaluate(PHONE)
     assert fit < 844.0  # px: the height of a common phone
-    assert coefficients < 2.2 * 844.0
+    assert fit < coefficients < steps < min(closes, 2.0 * 844.0)
     assert least >= 19.0
 
 

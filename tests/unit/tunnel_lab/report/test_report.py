@@ -140,11 +140,11 @@ class Page(HTMLParser):
 
 ORDER = (
     "What ", "How sure ", "What it costs ", "Do this first ", "The fit over the data",
-    "How much of the gap is explained", "Coefficients before and after", "What to do next", "Detail",
+    "Coefficients before and after", "What to do next", "How much of the gap is explained", "Detail",
 )  # fmt: skip
 
 
-def test_the_answer_in_four_lines_comes_first_then_pictures_coefficients_and_steps(page, document):
+def test_the_answer_in_four_lines_comes_first_then_the_fit_coefficients_and_steps(page, document):
     text = Page(page.split("</style>", 2)[2]).text
     places = [text.index(words) for words in (*ORDER, document["verdict"], document["where"]["words"])]
     assert places == sorted(places)
