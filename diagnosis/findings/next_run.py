@@ -157,7 +157,7 @@ class FurtherRuns(PlannedRun):
         """
         data, runs = fit.problem.data, []
         wide = [name for name, one in after.items() if source_of_width(name, one) == "noise"]
-        if not wide or fit.problem.scatter or all(run.drive is not None for run in data.runs):
+        if not wide or fit.problem.scatter or not data.decays:
             return None
         # a coefficient times unstated sizes is the fit's coefficient with other units
         names = data.model.coefficient_names(fit.problem.names)
