@@ -23,6 +23,7 @@ from identification.show.numbers import listed, plain, relative_change, share, w
 from identification.show.quantity import Quantity
 from identification.status import Outcome, Remark
 from tunnel_sim.effects import known_effects
+from tunnel_sim.vocabulary.errors import counted
 
 
 def next_steps(answer: Findings) -> list[str]:
@@ -277,7 +278,7 @@ def _narrowing(answer: Findings) -> Iterator[NextStep]:
     for source, gains in found.items():
         what = _NARROWS[source].format(other="inputs" if answer.found.driven else "release angles")
         if source == "noise" and runs is not None:
-            what = f"Make {runs.count} more runs: {runs.conditions(robot=answer.found.robot)}"
+            what = f"Make {counted(runs.count, 'more run')}: {runs.conditions(robot=answer.found.robot)}"
         yield NextStep(what, listed(gains))
 
 

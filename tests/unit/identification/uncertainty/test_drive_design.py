@@ -146,7 +146,7 @@ def test_the_density_is_that_of_the_drawn_moment() -> None:
     ):
         density = [effect.moment_density(rate, pressure) for rate in rates]
         assert np.trapezoid(density, rates) / (2.0 * np.pi) == pytest.approx(std**2, rel=2e-3)
-    assert effect_class("coulomb_friction")(0.01).moment_density(10.0, 5.0) == 0.0
+    assert effect_class("vortex_shedding")(0.01).moment_density(10.0, 5.0) == 0.0
 
 
 def test_what_cannot_be_planned_is_refused(free: PlanDocument) -> None:
