@@ -162,6 +162,7 @@ def kinds_option(_folder: Path, draw: Draw) -> None:
 
 def effects_file(folder: Path, draw: Draw) -> None:
     """An effects file changed, or a formula in it; what is accepted is made, weighed and compiled."""
+    from tunnel_sim.effects.capabilities import ReadingEffect
     from tunnel_sim.effects.expression_effect import read_effects
     from tunnel_sim.physics.run_settings import RunSettings
     from tunnel_sim.vocabulary.plan import AeroDerivatives
@@ -173,7 +174,8 @@ def effects_file(folder: Path, draw: Draw) -> None:
     for kind in read_effects(written(folder / "effects.toml", content, draw)):
         effect = kind(*kind.example)
         effect.on_run(stated, stated, None)
-        effect.on_angle(np.linspace(-0.3, 0.3, 5), np.arange(5.0), stated, None)
+        if isinstance(effect, ReadingEffect):
+            effect.on_angle(np.linspace(-0.3, 0.3, 5), np.arange(5.0), stated, None)
         if oracle := effect.moment_oracle(stated):
             oracle(0.0, 0.1, -0.1)
 
