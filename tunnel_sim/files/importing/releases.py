@@ -170,7 +170,9 @@ def _decays(swings: Swings) -> list[_Decay]:
             continue
         still = np.flatnonzero(sizes <= max(_BAND * float(sizes.max()), swings.least))
         moving = int(still[0]) if still.size else sizes.size
-        if moving >= _LEAST_HALVES and _is_decay(sizes[:moving], sizes, swings, start):
+        if moving >= _LEAST_HALVES and _is_decay(
+            sizes[:moving], sizes, swings, start, followed=until < count
+        ):
             found.append(_Decay(hand, start, moving, until))
     return found
 
@@ -227,14 +229,22 @@ def _bend(sizes: PerSample) -> float:
     return float(np.median(np.abs(np.diff(np.log(np.maximum(sizes, 1e-300)), 2))))
 
 
-def _is_decay(moving: PerSample, sizes: PerSample, swings: Swings, start: int) -> bool:
-    """Whether swings decay evenly, and none after them is larger than the first one, or grows much again."""
+def _is_decay(moving: PerSample, sizes: PerSample, swings: Swings, start: int, *, followed: bool) -> bool:
+    """Whether swings decay evenly, and none after them is larger than the first one, or grows much again.
+
+    Args:
+        followed: whether another release follows. A single large swing may then be the pull towards it.
+    """
     first = max(moving[:2]) if start == 0 else moving[0]
-    regrown = sizes > _GROWN * swings.sampled * np.minimum.accumulate(sizes)
+    large = sizes > _LITTLE * first
+    regrown = large & (sizes > _GROWN * swings.sampled * np.minimum.accumulate(sizes))
+    if followed:
+        regrown[:-1] &= large[1:]
+        regrown[-1] = False
     return bool(
         sizes.max() <= _STILL_GROWING * swings.sampled * first
         and first > _VISIBLE * swings.least
-        and (start == 0 or not (regrown & (sizes > _LITTLE * first)).any())
+        and (start == 0 or not regrown.any())
         and _bend(moving) <= _ROUGH + swings.least / max(float(np.median(moving)), swings.least)
     )
 

@@ -174,3 +174,17 @@ def test_random_motion_is_one_record_and_no_run_begins_in_it(zeta: float) -> Non
             pieces = find_runs(time, reading)
             cut += len(pieces) > 1 or pieces[0].first > 0
     assert cut <= 1
+
+
+@pytest.mark.parametrize("seed", [27, 37, 45, 50, 54, 58, 59])
+def test_a_pull_to_the_next_hold_between_two_samples_loses_no_release(seed: int) -> None:
+    """A logger that pauses while the hand moves the body; the pull looks like a swing of half its size."""
+    rng, rate, step = np.random.default_rng([9, seed]), 500.0, np.deg2rad(0.01)
+    time = np.arange(12000) / rate
+    swing = np.exp(-0.0115 * 20.6 * time) * np.cos(20.6 * time)
+    parts = [
+        part for a in (0.3, 0.2) for part in (np.full(round(rng.uniform(2.0, 3.5) * rate), a), a * swing)
+    ]
+    yaw = np.concatenate(parts) + 0.007
+    yaw = np.round((yaw + 3.5e-4 * rng.standard_normal(yaw.size)) / step) * step
+    assert len(find_runs(np.arange(yaw.size) / rate, yaw)) == 2
