@@ -186,11 +186,13 @@ def _sure(answer: Findings) -> str:
         several = [f"{probability(value)} for {text}" for text, value in alternatives]
         return "; ".join([*known, " or ".join(several)]) + rest
     first, *others = answer.candidates
+    likely = sum(one.probability for one in others)
     others = sorted((one for one in others if one.probability >= _COUNTS), key=lambda one: -one.probability)
     if not others:
         next_one = "no other answer has 1 %"
     else:
-        which = "the only other reading" if len(others) == 1 else "the next likeliest"
+        alone = likely - others[0].probability < _COUNTS
+        which = "the only other reading" if alone else "the next likeliest"
         next_one = f"{which}: {_against(others[0], first)} ({probability(others[0].probability)})"
     return f"{probability(first.probability)}; {next_one}{rest}"
 
