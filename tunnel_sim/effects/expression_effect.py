@@ -200,7 +200,7 @@ def _check_names(parameters: Mapping[str, ExpressionParameter]) -> None:
     for name, quantity in parameters.items():
         if not (name.isidentifier() and name.isascii()) or keyword.iskeyword(name):
             raise TunnelError(f"{name!r} is not a parameter's name", remedy="use letters, digits and _")
-        if name in _WORDS or hasattr(ExpressionEffect, name):
+        if name in _WORDS or hasattr(_Moment, name) or hasattr(_Reading, name):
             remedy = "choose a name that has no other meaning"
             raise TunnelError(f"a parameter cannot be named {name!r}", remedy=remedy)
         if not all(quantity.lower <= value <= quantity.upper for value in (quantity.default, quantity.scale)):

@@ -39,7 +39,7 @@ def effects_file(tmp_path: Path) -> Path:
         (('unit = "1/rad2"', 'unit = "1/deg2"'), "unknown unit '1/deg2'"),
         (('unit = "1/rad2", ', ""), "'unit' is missing"),
         (("scale = 0.05, lower = -1", "scale = 0.05, lower = 0.5"), "s: the default 0 or the scale 0.05 is not"),
-        (("parameters.s", "parameters.fitted"), "cannot be named 'fitted'"),
+        (("parameters.s", "parameters.on_angle"), "cannot be named 'on_angle'"),
         (('"gain"', '"Gain!"'), "'name' = 'Gain!'"),
         (("unit = \"1/rad2\", scale = 0.05", "unit = \"1/rad2\", scale = 0.0"), "parameter s: the scale is 0"),
         (("default = 0.06", "default = 0.6"), "effect 'detent': parameter w: the default 0.6 or the scale"),
