@@ -12,17 +12,9 @@ from pathlib import Path
 from pkgutil import iter_modules
 from typing import TypeVar, cast, get_args
 
+from tunnel_sim.effects import capabilities
 from tunnel_sim.effects.base import Effect, make_effect
-from tunnel_sim.effects.capabilities import (
-    AtRandom,
-    BetweenRuns,
-    Clock,
-    Friction,
-    OutOfPhase,
-    OwnNumbers,
-    ReadingEffect,
-    SecondOscillation,
-)
+from tunnel_sim.effects.capabilities import AtRandom, BetweenRuns
 from tunnel_sim.effects.traits import Channel, Condition
 from tunnel_sim.vocabulary.dimensions import dimension
 from tunnel_sim.vocabulary.errors import TunnelError, added_to, did_you_mean, loading, one_line
@@ -41,16 +33,11 @@ _under_way: ContextVar[tuple[type[Effect], ...]] = ContextVar(
 )
 
 _OF_SPECTRUM = 2  # parameters of a random moment
-_CAPABILITIES = (
-    BetweenRuns,
-    OwnNumbers,
-    Clock,
-    ReadingEffect,
-    SecondOscillation,
-    AtRandom,
-    Friction,
-    OutOfPhase,
-)
+_CAPABILITIES = tuple(
+    one
+    for one in vars(capabilities).values()
+    if isinstance(one, type) and issubclass(one, Effect) and one not in (Effect, BetweenRuns)
+)  # of users' effects too
 
 
 def check_described(kind: object) -> None:
