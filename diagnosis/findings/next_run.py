@@ -329,9 +329,8 @@ def _planned(fit: Fit, runs: tuple[RunData, ...], angle: float) -> tuple[Problem
     problem = dataclasses.replace(fit.problem, data=data, instants=1, scatter=())
     first = len(problem.parameters.own) - problem.parameters.of_effects
     start = (angle, 0.0, 0.0)[:first]
-    return problem, np.array(
-        [*start, *np.where(_turning(problem), 0.0, 0.5)]
-    )  # skipped in the middle of the run
+    # samples are skipped in the middle of the run
+    return problem, np.array([*start, *np.where(_turning(problem), 0.0, 0.5)])
 
 
 def _turning(problem: Problem) -> NDArray[np.bool_]:

@@ -236,13 +236,10 @@ def _written_model(
     noise = (
         change.own(study.prepared.noise.std, change.reading) if not study.campaign.sensor.derivative else 0.0
     )
-
     still = next((i for i, run in enumerate(problem.data.runs) if not run.wind_on), 0)
-
     given = model.spec().compile() if study.campaign.driven else None
     runs, actuator = controlled(study.campaign, model.law.actuator), model.law.actuator
     at = next((i for i, run in enumerate(problem.data.runs) if run.id in runs), None)
-
     steps = None if given is None else partial(inertia_of_steps, given)
 
     def law(common: Array) -> FoundLaw:

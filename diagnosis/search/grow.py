@@ -69,9 +69,8 @@ def going_on(
     if best.explains_runs:  # only differences between runs remain, which further effects may explain
         known = max(parent.fit.shown_between_runs for parent in parents)
         patterns = [child for child in ranked if in_pairs and child.fit.shown_between_runs > known]
-        patterns.sort(
-            key=lambda child: child.fit.unlikelihood
-        )  # a width that is no smaller hides their weight
+        # not by weight: a scatter that is as wide as before hides it
+        patterns.sort(key=lambda child: child.fit.unlikelihood)
         return patterns or [child for child in ranked if child is best]
     going = []
     for child in ranked:  # may still improve on its best parent: one of two equal causes explains half
