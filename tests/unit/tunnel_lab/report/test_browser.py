@@ -96,6 +96,30 @@ def test_nothing_is_wider_than_the_page_and_every_text_can_be_read(opened: Opene
         assert [pair for pair in pairs if pair[1] < LEAST_CONTRAST] == [], scheme
 
 
+LONG = """() => {
+  const table = document.querySelector("#coefficients-section table");
+  for (const row of table.rows) {
+    const added = row.insertCell();
+    added.className = "n";
+    added.textContent = "added";
+    for (const cell of row.querySelectorAll("td")) cell.innerHTML = "<span>−0.1112943 ± 0.0000071</span>";
+  }
+}"""
+OVER = """() => {
+  const [section, table] = ["", " table"].map((end) =>
+    document.querySelector("#coefficients-section" + end).getBoundingClientRect().right);
+  return table - section;
+}"""
+
+
+@pytest.mark.parametrize("opened", WIDTHS, indirect=True)
+@pytest.mark.parametrize("media", ["screen", "print"])
+def test_long_coefficients_stay_beside_the_waterfall(opened: Opened, media: Any) -> None:
+    opened.page.evaluate(LONG)
+    opened.page.emulate_media(media=media)
+    assert opened.page.evaluate(OVER) <= 1.0
+
+
 @pytest.mark.parametrize("opened", WIDTHS[:1], indirect=True)
 def test_the_first_sheet_stands_open_and_the_detail_is_folded(opened: Opened) -> None:
     assert opened.page.is_visible("text=What to do next")
