@@ -18,7 +18,7 @@ import numpy as np
 import polars as pl
 
 from identification.show.blocks import Paragraph, TextTable
-from identification.show.numbers import significant
+from identification.show.numbers import listed, significant
 from identification.show.style import figure, styled
 from tunnel_lab.experiments.estimate_rows import counted_failures, not_given
 from tunnel_lab.experiments.experiment import RESULTS, Done, Experiment, parquet
@@ -40,6 +40,7 @@ from tunnel_reference.make import as_campaign
 from tunnel_reference.severity import read_and_fit, simulate_motions, size_effects
 from tunnel_reference.true_conditions import TrueConditions
 from tunnel_sim.effects import ALL_EFFECTS, BetweenRuns
+from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import Truth
 
 if TYPE_CHECKING:
@@ -277,6 +278,9 @@ def breakdown_view(results: pl.DataFrame) -> ExperimentView:
         results: of `breakdown_of`.
     """
     frame = breakdown_frame(results)
+    if frame.is_empty():
+        what = f"the estimators give none of {listed([*QUANTITIES])}, whose bias a breakdown shows"
+        raise TunnelError(what, remedy="name one that does, such as output_error")
     given = [quantity for quantity in SHOWN if quantity in set(frame["quantity"])]
     tables = [one for quantity in given for one in breakdown_tables(frame, quantity)]
     return ExperimentView(

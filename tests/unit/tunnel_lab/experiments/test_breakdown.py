@@ -10,6 +10,7 @@ from tunnel_lab.experiments import breakdown as view
 from tunnel_lab.experiments import breakdown as work
 from tunnel_lab.experiments.experiment import results_of
 from tunnel_lab.experiments.runner import processes
+from tunnel_sim.vocabulary.errors import TunnelError
 
 NAMES = ("matrix_pencil", "conventional")
 EFFECTS = ("coulomb_friction", "sensor_drift")
@@ -84,6 +85,14 @@ def test_an_interrupted_map_goes_on(cases, found, tmp_path, monkeypatch):
     again = work.breakdown_frame(results_of(experiment, tmp_path, processes(0))[0])
     assert asked == list(NAMES)
     assert again.equals(found)
+
+
+def test_estimators_that_give_no_coefficient_are_refused():
+    rows = [("no effect", 0.0, "hilbert", name, None, "ok") for name in work.QUANTITIES]
+    columns = ("effect", "severity", "estimator", "quantity", "value", "status")
+    results = pl.DataFrame(rows, schema=columns, schema_overrides={"value": pl.Float64}, orient="row")
+    with pytest.raises(TunnelError, match="give none of cn_beta"):
+        view.breakdown_view(results)
 
 
 def test_all_effects_of_the_vocabulary_have_a_form_to_inject():
