@@ -289,10 +289,14 @@ class Findings:
             remedy: in an error.
 
         Raises:
-            TunnelError: when it is not a diagnosis: a key or a setting is unknown, a key is missing, or a value
-                has the wrong type.
+            TunnelError: when it is of another version or not a diagnosis: a key or a setting is unknown, a key is
+                missing, or a value has the wrong type.
         """
         check_shape(data, where, remedy)
+        if (version := data.get("schema_version")) != SCHEMA_VERSION or isinstance(version, bool):
+            stated_version = one_line(repr(version), 40) if "schema_version" in data else "not stated"
+            what = f"schema_version is {stated_version}, but this program reads version {SCHEMA_VERSION}"
+            raise TunnelError(what, where=where, remedy=remedy)
         with as_described("is not a diagnosis", where, remedy):
             adapter = _adapter(cast(Any, cls))
             found = cast(Self, adapter.validate_json(json.dumps(_by_field(data)), strict=True))

@@ -34,7 +34,8 @@ def findings_of(written: Mapping[str, Any]) -> Diagnosis:
         written: some of the fields of `document`, and of the parts of a diagnosis.
     """
     given = {**_NOTHING, **written}
-    return Diagnosis.from_json_dict({name: _filled(value, _PARTS.get(name)) for name, value in given.items()})
+    filled = {name: _filled(value, _PARTS.get(name)) for name, value in given.items()}
+    return Diagnosis.from_json_dict({"schema_version": 1, **filled})
 
 
 def _filled(given: Any, empty: Any) -> Any:

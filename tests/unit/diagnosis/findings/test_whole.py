@@ -79,3 +79,18 @@ def test_a_diagnosis_is_what_its_document_says() -> None:
     assert Diagnosis.from_json_dict(written) == found
     written["maps"]["grid"]["excess"][0][0] += 0.01
     assert Diagnosis.from_json_dict(written) != found
+
+
+@pytest.mark.parametrize(
+    ("version", "said"), [(99, "is 99"), ("1", "is '1'"), (True, "is True"), (None, "is None")]
+)
+def test_a_document_of_another_version_is_refused(version: Any, said: str) -> None:
+    given = {**document(), "schema_version": version}
+    with pytest.raises(TunnelError, match=rf"schema_version {said}, but this program reads version 1"):
+        Diagnosis.from_json_dict(given)
+
+
+def test_a_document_without_a_version_is_refused() -> None:
+    given = {key: value for key, value in document().items() if key != "schema_version"}
+    with pytest.raises(TunnelError, match="schema_version is not stated"):
+        Diagnosis.from_json_dict(given)
