@@ -17,13 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.policy import DIFFERENCE_RATE, LEAST_CHANGE, OUTLIER_MEDIANS
-from identification.show.quantity import Quantity
+from identification.show.quantity import INTERVAL, Quantity
 from identification.statistics import Proportion
 from tunnel_sim.vocabulary.record import Array, read_only
 
 NOMINAL_COVERAGE = 0.95
-INTERVAL = 1.959963984540054
-"""Half the width of a 95 % interval in standard deviations."""
 _LEAST = 2  # trials needed for a sampling error
 
 

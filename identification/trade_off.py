@@ -14,10 +14,9 @@ from typing import Any
 import numpy as np
 
 from identification.policy import TRADE_OFF_CORRELATION
+from identification.show.quantity import INTERVAL
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
-
-_REACH = 1.96  # standard deviations of a normal distribution on each side of its mean, 0.95 in all
 
 
 @dataclass(frozen=True)
@@ -58,7 +57,7 @@ class Combination:
             return None
         whole = float(values[0] + factor * values[1])
         std = math.sqrt(max(float(covariance[0, 0] + factor * covariance[0, 1]), 0.0))
-        own, reach = float(values[1]), _REACH * math.sqrt(float(covariance[1, 1]))
+        own, reach = float(values[1]), INTERVAL * math.sqrt(float(covariance[1, 1]))
         low = max(own - reach, bounds[1, 0], (whole - bounds[0, 1]) / factor)
         high = min(own + reach, bounds[1, 1], (whole - bounds[0, 0]) / factor)
         ends = (

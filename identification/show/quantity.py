@@ -10,8 +10,8 @@ if TYPE_CHECKING:
     from numpy.typing import DTypeLike, NDArray
     from pydantic import ConfigDict
 
-INTERVAL = 1.96
-"""Standard deviations on either side of a 95 % interval."""
+INTERVAL = 1.959963984540054
+"""Half the width of a 95 % interval of a normal distribution, in standard deviations."""
 _FINITE: ConfigDict = {"allow_inf_nan": False}
 
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from identification.scoring import INTERVAL, NOMINAL_COVERAGE, Score, score
+from identification.scoring import NOMINAL_COVERAGE, Score, score
+from identification.show.quantity import INTERVAL
 from identification.show.style import COLOURS, MARKERS, WIDTH, figure, grid, log_axis, styled, text_width
 from tunnel_lab.experiments.score import Results
 from tunnel_lab.experiments.score_columns import NAMES

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from identification.scoring import INTERVAL, ScoredEstimate, collect, overall, reach_of_rmse, score
-from identification.show.quantity import Quantity
+from identification.scoring import ScoredEstimate, collect, overall, reach_of_rmse, score
+from identification.show.quantity import INTERVAL, Quantity
 from identification.statistics import Proportion
 from tunnel_sim.files.writing import as_json
 
