@@ -3,7 +3,8 @@
 In windows of envelope and phase, the nominal model and each of many rivals is a linear fit
 (`identification.neural.rivals`). Values are medians of the mixture with the network's weights, with its 95 %
 intervals; the standard deviation is the interval's width over 3.92. ζ and ωn are values at small amplitude, and
-Cnβ, Cnr, Izz and Cr the linear coefficients, whatever effects act. Records unlike all training are refused.
+Cnβ, Cnr, Izz and Cr the linear coefficients, whatever effects act. Records
+unlike all training are refused, and campaigns that state a scatter between runs.
 """
 
 from __future__ import annotations
@@ -60,11 +61,22 @@ class _DemodulatedRun:
         return float(rate), float(omega)
 
     @property
+    def departs(self) -> bool:
+        """Whether envelope and phase depart from the nominal fit by more than the noise within the windows."""
+        freedom = self.alone.freedom
+        return bool(self.alone.remaining[0] > chdtri(freedom, 0.5 * MISFIT_RATE))
+
+    @property
+    def slow(self) -> float:
+        """Variance of envelope and phase over the one by noise within the windows; 1 where they agree."""
+        return max(float(self.alone.remaining[0]) / self.alone.freedom, 1.0) if self.departs else 1.0
+
+    @property
     def gained(self) -> Gained:
         """Decay rate and stiffness of the nominal fit; a free decay has no gain."""
         rate, omega = self.rate_and_omega
         slopes = np.array([[1.0, 0.0], [2.0 * rate, 2.0 * omega]])
-        covariance = slopes @ self.alone.covariances[0] @ slopes.T
+        covariance = self.slow * (slopes @ self.alone.covariances[0] @ slopes.T)
         return Gained.of(np.array([rate, omega**2 + rate**2, 0.0]), covariance)
 
 
@@ -121,7 +133,8 @@ class NeuralPosterior:
                 campaign, estimate, known_runs, design, nothing, np.zeros((0, 0)), statuses
             )
         posterior = posteriors([features], self.networks["campaign"])[0]
-        if posterior.unlike:
+        # the runs of the training differ by noise and effects alone
+        if posterior.unlike or (campaign.repeatability is not None and campaign.repeatability.stated):
             return replace(estimate, statuses=by_severity(statuses | {Status.UNLIKE_TRAINING}))
         known = np.flatnonzero(features.known)
         names = tuple(CAMPAIGN_NAMES[place] for place in known)
@@ -169,21 +182,18 @@ def _runs(runs: Sequence[Run], network: TrainedPosterior) -> list[_DemodulatedRu
 
 def _described(seen: _DemodulatedRun, sensor: SensorProperties) -> RunEstimate:
     # The noise within the windows; the χ² of envelope and phase and the largest harmonic judge the model.
-    total, freedom = float(seen.alone.remaining[0]), seen.alone.freedom
     std = seen.windows.noise * float(np.sqrt(seen.windows.block))
     rate, omega = seen.rate_and_omega
     harmonics = np.concatenate((seen.windows.second, seen.windows.third))
     distorted = float(np.max(np.tile(seen.windows.information, 2) * np.abs(harmonics) ** 2))
-    limit = 0.5 * MISFIT_RATE
-    departs = bool(total > chdtri(freedom, limit) or distorted > chdtri(2, limit / harmonics.size))
+    departs = seen.departs or bool(distorted > chdtri(2, 0.5 * MISFIT_RATE / harmonics.size))
     stated = stated_noise(sensor)
     disagrees = False
     if stated is not None:
         own = 1.0 / np.sqrt(2.0 * seen.windows.samples.sum())
         tolerance = MISFIT_DEVIATIONS * float(np.hypot(NOISE_TOLERANCE, own))
         disagrees = stated > 0.0 and abs(std / stated - 1.0) > tolerance
-    slow = max(total / freedom, 1.0) if departs else 1.0
-    noise = NoiseLevel(std, "residual", std, slow, departs, disagrees)
+    noise = NoiseLevel(std, "residual", std, seen.slow, departs, disagrees)
     if departs:  # coloured noise is no departure
         check = residual_check(seen.run, Decay(rate, omega**2 + rate**2), sensor)
         noise = noise if check is None or check.colour is None else check.noise

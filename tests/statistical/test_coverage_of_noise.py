@@ -112,11 +112,19 @@ def test_deviations_are_neither_too_small_nor_too_large(kind, estimator, count, 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("estimator", WIDER)
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("kind", "estimator"), [(k, e) for k in KINDS for e in WIDER if (k, e) != ("scatter", "neural_posterior")]
+)
 def test_the_networks_deviations_are_not_too_small(kind, estimator):
     scores, _ = trials(kind, estimator, 60)
     assert objections(scores, least=0.0) == []
+
+
+def test_the_posterior_refuses_runs_that_scatter():
+    found = identify(drawn("scatter", 0), "neural_posterior", throw=False)
+    assert Status.UNLIKE_TRAINING in found.statuses
+    assert found.cn_beta is None
+    assert all(run.zeta is not None for run in found.runs)
 
 
 @pytest.mark.parametrize("factor", [0.6, 1.0 / 0.6])
