@@ -127,7 +127,7 @@ class SearchSettings:
         "Time. Of five campaigns with up to 80,000 readings, one was answered sooner that way, and one "
         "later.",
         unit="block means",
-        decision="0054",
+        decision="0034",
     )
     begun_on: int = setting(
         15_000,
@@ -135,7 +135,7 @@ class SearchSettings:
         "tuned",
         "Time against coverage, on Silverbox and on sealed campaigns.",
         unit="block means",
-        decision="0054",
+        decision="0034",
     )
 
 

@@ -1,4 +1,4 @@
-// A moment stated as an expression: a short program that the moment law evaluates (docs/decisions/0021).
+// A moment stated as an expression: a short program that the moment law evaluates (docs/decisions/0006).
 //
 // A program is an array of doubles in postfix order. Every element is the number of an operation; the operation
 // `number` is followed by its value. MuJoCo keeps it in a <numeric>, as it keeps coefficients.
