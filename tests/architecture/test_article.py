@@ -12,6 +12,7 @@ DOCS = ROOT / "docs"
 TEXT = " ".join((ROOT / "paper.md").read_text(encoding="utf-8").split())
 BLIND = (DOCS / "blind-check.md").read_text(encoding="utf-8")
 REAL = (DOCS / "real-records.md").read_text(encoding="utf-8")
+NEURAL = (DOCS / "neural-posterior.md").read_text(encoding="utf-8")
 CAUSES = (DOCS / "benchmark-of-causes.md").read_text(encoding="utf-8")
 
 
@@ -52,6 +53,20 @@ def test_the_figures_of_the_benchmark_are_those_of_its_page() -> None:
     causes = CAUSES[CAUSES.index("## Causes") :]
     false, named = found(r"^\| tunnel diagnose \|(?:[^|]*\|){2} (\d+)/(\d+) ", causes)
     assert f"{false} of {named} named causes false" in " ".join(TEXT.split())
+
+
+def test_the_figures_of_other_programs_are_those_of_their_pages() -> None:
+    of, right, ours = found(
+        r"On the (\d+) campaigns that both answered it has (\d+) exact sets, and `tunnel diagnose` (\d+)",
+        CAUSES,
+    )
+    assert f"has answered {of} campaigns, {right} of them exactly; this package has {ours} of these" in TEXT
+    name = {"sbi": "sbi, our windows", "ours": "neural posterior"}
+    bound = {who: found(rf"^\| {row} \| ([\d.]+) \| [\d.]+ \| 9", NEURAL)[0] for who, row in name.items()}
+    error = {who: found(rf"^\| {row} \| ([\d.]+) \| \d+\.\d ± ", NEURAL)[0] for who, row in name.items()}
+    assert f"{bound['sbi']} times the Cramér–Rao bound" in TEXT
+    assert f"is right, against {bound['ours']}" in TEXT
+    assert f"is {error['sbi']} standard deviations of the nominal fit, against {error['ours']}." in TEXT
 
 
 def test_references_and_pictures_exist() -> None:
