@@ -9,6 +9,7 @@ import hashlib
 import heapq
 import json
 from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -228,6 +229,7 @@ def score(
         "not_seen": sorted(about.not_seen),
         "key_sha256": seal["key_sha256"],
         "answers_sha256": hashlib.sha256(text).hexdigest(),
+        "scored": datetime.now(UTC).date().isoformat(),
         "answered": len(every),
         "of": len(key["truths"]),
         "all": figures(every),

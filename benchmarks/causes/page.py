@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -72,8 +73,8 @@ def page_text(
         f"\nThe set has {sum(t.count for t in TRACKS.values())} simulated campaigns (version {VERSION}, "
         f"seed {SEED}) and "
         "the packaged measured records. [How it is made, and how to enter](../benchmarks/causes/README.md). "
-        "`python -m benchmarks.causes page` writes this page; nothing in it is typed by hand. Intervals are "
-        "Wilson's at 95 %. A method that cannot see a track has “–”.\n",
+        f"`python -m benchmarks.causes page` writes this page from answers scored {_scored(found)}; nothing in "
+        "it is typed by hand. Intervals are Wilson's at 95 %. A method that cannot see a track has “–”.\n",
         "## Sets exactly right\n",
         _table(("method", "all", *(t.replace("_", " ") for t in _TRACKS)), [_exact(r) for r in found]),
         f"\n![Sets exactly right by method, with intervals]({image})\n",
@@ -207,11 +208,18 @@ def _scatter_table(found: Sequence[Mapping[str, Any]]) -> list[str]:
         "\n## Runs that do not repeat exactly\n",
         f"Version {_SCATTERING} of the set (seed {edition.seed}) has {sum(edition.counts.values())} campaigns. In "
         "most of them wind speed, springs or damping differ from run to run by chance. Sets are exact whether "
-        "scatter is named or not; how it is named stands beside them."
+        f"scatter is named or not; how it is named stands beside them. The answers were scored {_scored(found)}."
         + ("" if OURS in [r["method"] for r in found] else " `tunnel diagnose` has not been run on it yet.")
         + "\n",
         _table(heads, rows),
     ]
+
+
+def _scored(found: Sequence[Mapping[str, Any]]) -> str:
+    """The days on which the answers were scored."""
+    days = sorted({date.fromisoformat(r["scored"]) for r in found})
+    first, last = (f"{day.day} {day:%B %Y}" for day in (days[0], days[-1]))
+    return f"on {first}" if first == last else f"from {first} to {last}"
 
 
 def _coefficients_table(found: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -290,7 +290,8 @@ def test_the_page_says_first_where_another_method_is_ahead(small):
     best = score(small, check(small), answers, "best", About("best", ""))
     worst = {name: {**a, "causes": ["unknown"]} for name, a in answers.items()}
     ours = score(small, check(small), worst, "ours", About("tunnel diagnose", ""))
-    text = page_text([best, ours], "figure.png")
+    text = page_text([{**best, "scored": "2026-11-02"}, {**ours, "scored": "2026-10-30"}], "figure.png")
+    assert "from answers scored from 30 October 2026 to 2 November 2026;" in text
     assert text.index("**best** has more exact sets: 3 against 0") < text.index("## Sets exactly right")
     first = next(name for name, truth in check(small)["truths"].items() if truth["track"] == "none")
     part = score(small, check(small), {first: answers[first]}, "part", About("part", ""))
