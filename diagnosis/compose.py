@@ -373,7 +373,7 @@ def _predictions(
         ahead=gap.closed_ahead,
         patched=None if patched is None else patched.judged(chosen),
         untested=None if patched is None else patched.untested(chosen),
-        left=None if gap.misfit is None else gap.misfit.of_swing(gap.excess_after),
+        left=gap.misfit.of_swing(gap.excess_after),
         elsewhere=isinstance(place, PlaceFound) and place.elsewhere,
     )
 

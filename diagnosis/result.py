@@ -106,9 +106,8 @@ class Diagnosis(Findings):
         rows: list[tuple[str, str, float, float | None, str]] = []
         for name in ("excess_before", "excess_after", "closed"):
             rows.append(("gap", name, getattr(gap, name), None, "1"))
-        if gap.misfit is not None:
-            for name, excess in (("rms_before", gap.excess_before), ("rms_after", gap.excess_after)):
-                rows.append(("gap", name, gap.misfit.rms(excess), None, gap.misfit.unit))
+        for name, excess in (("rms_before", gap.excess_before), ("rms_after", gap.excess_after)):
+            rows.append(("gap", name, gap.misfit.rms(excess), None, gap.misfit.unit))
         first = self.candidates[0]
         for name, given in first.parameters.items():
             owner, _, parameter = name.rpartition(".")

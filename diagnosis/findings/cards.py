@@ -5,7 +5,6 @@ from __future__ import annotations
 from itertools import pairwise
 
 from diagnosis.findings.closure import WITHIN_THE_NOISE
-from diagnosis.findings.misfit import misfit_shown, unit_of
 from diagnosis.findings.repeatability import width_text
 from diagnosis.findings.terms import BETWEEN_RUNS, SCATTERS, acts_on, scattering, without_scatter
 from diagnosis.findings.whole import Findings
@@ -42,9 +41,9 @@ def cause_cards(answer: Findings) -> list[Card]:
         return []
     first = answer.candidates[0]
     names = first.effect.split(" + ")
-    does = {size.effect: size.words(unit_of(answer)) for size in answer.sizes}
+    does = {size.effect: size.words(answer.misfit.unit) for size in answer.sizes}
     steps = answer.waterfall.steps
-    gaps = [misfit_shown(answer, step.excess) for step in steps]
+    gaps = [answer.misfit.words(step.excess) for step in steps]
     if steps and _calm(answer):
         gaps[-1] = WITHIN_THE_NOISE
     closes: dict[str, str] = {}

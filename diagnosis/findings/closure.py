@@ -3,35 +3,31 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from diagnosis.answer.held_out import Waterfall
 from diagnosis.findings.finding import Picture
 from diagnosis.findings.judged import Judged
-from diagnosis.findings.misfit import excess_std, misfit_scale, misfit_text, unit_of
+from diagnosis.findings.misfit import Misfit
 from diagnosis.findings.terms import answer_name
+from diagnosis.where.maps import Maps
 from identification.show.blocks import TextTable
 from identification.show.drawing import ACCENT, AFTER, BEFORE, INK, LINE, NARROW, NOISE, PAPER, QUIET, SIGMAS
 from identification.show.numbers import p_text, plain, reading_shown, significant, unit_mark
 from identification.show.style import figure, figure_text, grid, styled
+from tunnel_sim.files.from_json import from_json_fields
+from tunnel_sim.files.writing import as_json
 from tunnel_sim.vocabulary.campaign import Campaign
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any
-
-from diagnosis.findings.judged import Misfit
-from tunnel_sim.files.from_json import from_json_fields
-from tunnel_sim.files.writing import as_json
 
 
 @dataclass(frozen=True)
@@ -76,16 +72,15 @@ class GapSummary:
     runs: tuple[RunGap, ...]
     false_alarm_rate: float
     p_value: float
-    tests: Mapping[str, float] = field(default_factory=dict)
-    misfit: Misfit | None = None
+    tests: Mapping[str, float]
+    misfit: Misfit
     closed_ahead: float | None = None
 
     def to_json_dict(self) -> dict[str, Any]:
         """Fields by name, and in ``misfit`` those of `Misfit` and the root mean squares before and after."""
         found = {name: as_json(getattr(self, name)) for name in self.__dataclass_fields__}
-        if self.misfit is not None:
-            before, after = self.misfit.rms(self.excess_before), self.misfit.rms(self.excess_after)
-            found["misfit"] |= {"before": before, "after": after}
+        before, after = self.misfit.rms(self.excess_before), self.misfit.rms(self.excess_after)
+        found["misfit"] |= {"before": before, "after": after}
         return found
 
 
@@ -175,11 +170,14 @@ def runs_table(
         ("spring [N m/rad]", *["wind [m/s]"] * windy, "duration [s]", "sample rate [Hz]") if runs else ()
     )
 
-    def after(value: float) -> str:
-        return misfit_text(judged, value) if named else "–"
+    def before(value: float) -> str:
+        return gap.misfit.words(value, times=True)
 
-    before = misfit_text(judged, gap.excess_before)
-    rows = [("all", *[""] * len(conditions), before, after(gap.excess_after), "")] if gap.detected else []
+    def after(value: float) -> str:
+        return before(value) if named else "–"
+
+    whole = ("all", *[""] * len(conditions), before(gap.excess_before), after(gap.excess_after), "")
+    rows = [whole] if gap.detected else []
     for name in runs or (gaps if gap.detected else ()):
         found, stated = gaps.get(name), []
         if run := runs.get(name):
@@ -187,7 +185,7 @@ def runs_table(
             wind = [f"{run.wind_speed:g}" if run.wind_on else "off"] if windy else []
             stated = [spring, *wind, f"{run.record.duration:.3g}", f"{run.record.sample_rate:.4g}"]
         fitted = " (fitted)" if found and not found.held_out else ""
-        sizes = (misfit_text(judged, found.before), after(found.after)) if found else ("–", "–")
+        sizes = (before(found.before), after(found.after)) if found else ("–", "–")
         rows.append((name + fitted, *stated, *sizes, "yes" if name in shows else ""))
     shown = "shows the gap"
     heads = ("run", *conditions, "before", "after", shown)
@@ -195,14 +193,14 @@ def runs_table(
     return TextTable(f"Gap, {_IN_BRACKETS}", heads, tuple(rows), right=heads[1:-1], detail=detail)
 
 
-def waterfall_table(waterfall: Waterfall, judged: Judged) -> TextTable:
+def waterfall_table(waterfall: Waterfall, misfit: Misfit) -> TextTable:
     """The residual gap with each cause added, and without each; a table without rows where no cause is named."""
     steps, without = waterfall.steps, waterfall.without
     rows = []
     for step in steps if len(steps) > 1 else ():
-        alone = misfit_text(judged, without[step.effect]) if step.effect and step.effect in without else ""
+        alone = step.effect and step.effect in without and misfit.words(without[step.effect], times=True)
         name = answer_name(step.effect) if step.effect else "without the causes"
-        rows.append((name, misfit_text(judged, step.excess), alone))
+        rows.append((name, misfit.words(step.excess, times=True), alone or ""))
     title = f"Gap {waterfall.held_out} as the causes are added, {_IN_BRACKETS}"
     heads = ("cause added", "residual gap", "without this cause")
     return TextTable(title, heads, tuple(rows), heads[1:], names=heads[:1])
@@ -231,16 +229,22 @@ def tests_table(gap: GapSummary) -> TextTable:
     return TextTable(title, ("test", "tested property", "p"), rows, right=("p",))
 
 
-def noise_line(noise: NoiseSummary, judged: Judged) -> str:
-    """The noise to which the gap is compared, and its origin."""
-    unit = unit_of(judged)
+def noise_line(noise: NoiseSummary, unit: str) -> str:
+    """The noise to which the gap is compared, and its origin.
+
+    Args:
+        unit: of the readings.
+    """
     size = f"{reading_shown(noise.std, 3, unit)} (noise_std = {noise.std:.3g} {unit_mark(unit)})"
     return f"Noise: {size}, {noise.source} ({noise.reason})."
 
 
-def model_line(checked: Confirmation, judged: Judged) -> str:
-    """The model that the gaps are computed with; empty where a caveat says more about it."""
-    unit = unit_of(judged)
+def model_line(checked: Confirmation, unit: str) -> str:
+    """The model that the gaps are computed with; empty where a caveat says more about it.
+
+    Args:
+        unit: of the readings.
+    """
     if not checked.agrees:
         return ""
     most, rms, allowed = (
@@ -257,33 +261,35 @@ WITHIN_THE_NOISE = "within the noise"
 """A residual gap that is not significant, in the words of the verdict."""
 
 
-def closure_pictures(gap: GapSummary, waterfall: Waterfall, judged: Judged) -> tuple[Picture, ...]:
+def closure_pictures(
+    gap: GapSummary, waterfall: Waterfall, maps: Maps | None, judged: Judged
+) -> tuple[Picture, ...]:
     """The residual gap as the causes are added, where some are, and run by run."""
     by_cause = Picture(
         "waterfall",
         "What the model misses, as the causes are added one after another. Open circles: without this cause alone.",
         "The residual gap as the causes are added one after another.",
-        partial(waterfall_figure, waterfall, judged),
+        partial(waterfall_figure, waterfall, maps, judged),
     )
     by_run = Picture(
         "how-far",
         "Misfit of every run before and after. Filled circles: the run was held out of the fit, and only its "
         "release was refitted. Open circles: the run was part of the fit.",
         "Misfit of every run with the nominal model and with the causes added.",
-        partial(closure_figure, gap, judged),
+        partial(closure_figure, gap, maps),
     )
     return (*([by_cause] if len(waterfall.steps) > 1 else []), by_run)
 
 
 @styled
-def waterfall_figure(waterfall: Waterfall, judged: Judged) -> Figure:
+def waterfall_figure(waterfall: Waterfall, maps: Maps | None, judged: Judged) -> Figure:
     """The residual gap as the causes are added one after another.
 
     A dot for the nominal gap, a bar for each cause from the residual before it to the residual after it, and a dot
     for the rest, on a linear scale of the root mean square misfit.
     """
     steps = waterfall.steps
-    unit, size = misfit_scale(judged)
+    unit, size = judged.misfit.scale()
     misfits = np.array([size(step.excess) for step in steps], np.float64)
     without = {name: size(value) for name, value in waterfall.without.items()}
     alone = [without.get(step.effect or "", np.nan) if len(without) > 1 else np.nan for step in steps]
@@ -318,7 +324,7 @@ def waterfall_figure(waterfall: Waterfall, judged: Judged) -> Figure:
     # The residual after the last cause is given in the row of the rest.
     words = [shown[0], *(f"leaves {text}" for text in shown[1:-1]), "", shown[-1]]
     _place_texts(axes, words, [misfits[0], *upper, misfits[-1]], [*alone, np.nan])
-    noise = size(SIGMAS * (excess_std(judged) or _LEAST_EXCESS))
+    noise = size(SIGMAS * (maps.excess_std if maps else _LEAST_EXCESS))
     seen = noise > _VISIBLE * axes.get_xlim()[1]
     axes.axvspan(0.0, noise, color=NOISE, linewidth=0, zorder=0.3, label="noise (3σ)" if seen else None)
     if seen or np.isfinite(alone).any():  # a key aligned with the axis above it
@@ -367,16 +373,16 @@ def _place_texts(axes: Axes, words: Sequence[str], ends: Sequence[float], marks:
 
 
 @styled
-def closure_figure(gap: GapSummary, judged: Judged) -> Figure:
+def closure_figure(gap: GapSummary, maps: Maps | None) -> Figure:
     """Misfit of every run before and after the causes are added; filled marks for runs held out of the fit."""
     runs = gap.runs
     fig = figure(NARROW, 1.2 + 0.22 * max(len(runs), 4))
     axes = fig.add_subplot()
     rows = np.arange(len(runs))
-    unit, size = misfit_scale(judged)
+    unit, size = gap.misfit.scale()
     before = np.array([size(run.before) for run in runs])
     after = np.array([size(run.after) for run in runs])
-    stds = [run.std for run in judged.maps.runs] if judged.maps else []
+    stds = [run.std for run in maps.runs] if maps else []
     noise = size(SIGMAS * max(stds) if stds else _LEAST_NOISE)
     axes.axvspan(0.0, noise, color=NOISE, lw=0, label="noise (3σ)")
     most = 1.05 * float(max(before.max(), after.max())) or 1.0

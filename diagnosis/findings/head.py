@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 from diagnosis.findings.candidates import Candidate
 from diagnosis.findings.cautions import CAUTIONS, said
-from diagnosis.findings.misfit import misfit_shown, unit_of
 from diagnosis.findings.next_steps import next_steps, shares_of_gap
 from diagnosis.findings.terms import (
     BETWEEN_RUNS,
@@ -179,7 +178,7 @@ def _sure(answer: Findings) -> str:
         return f"Not yet: {'; '.join(_likeliest(answer))}"
     rest = ""
     if answer.rest_is_material and answer.names_effects:
-        rest = f"; {misfit_shown(answer, answer.gap.excess_after)} of misfit remains"
+        rest = f"; {answer.misfit.words(answer.gap.excess_after)} of misfit remains"
     if answer.ambiguous_with:
         certain, alternatives = answer.named_causes.certain_and_open(sized=False)
         known = [f"{answer.named_causes.included(name)} for {_called(answer, name)}" for name in certain]
@@ -277,7 +276,7 @@ def _warnings(answer: Findings) -> Iterator[str]:
             yield str(remark)
     for fact in answer.found.cautions:
         if fact.kind in _CHANGES:
-            yield said(CAUTIONS, fact, unit_of(answer))
+            yield said(CAUTIONS, fact, answer.misfit.unit)
 
 
 _CHANGES = {"not followed", "only one run", "more noise than stated", "zeros apart"}

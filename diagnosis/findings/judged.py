@@ -2,38 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Protocol
 
+from diagnosis.findings.misfit import Misfit
 from diagnosis.settings import Settings
-from diagnosis.where.maps import Maps
 from identification.show.quantity import Quantity
 from identification.status import Remark
-
-
-@dataclass(frozen=True)
-class Misfit:
-    """Conversion from an excess to a misfit.
-
-    Args:
-        noise: standard deviation of one sample's noise, against which excesses are measured, in ``unit``.
-        swing: root mean square of the readings about the mean of each run, in ``unit``.
-        unit: of the readings: ``rad``, ``rad/s`` or ``rad/s2``.
-    """
-
-    noise: float
-    swing: float
-    unit: str
-
-    def rms(self, excess: float) -> float:
-        """Root mean square in ``unit`` of an excess in noise variances of a sample; below zero it is chance."""
-        return self.noise * math.sqrt(max(excess, 0.0))
-
-    def of_swing(self, excess: float) -> float | None:
-        """The same as a share of the swing; None where the readings do not move."""
-        return self.rms(excess) / self.swing if self.swing > 0.0 else None
 
 
 class Judged(Protocol):
@@ -64,12 +39,12 @@ class Judged(Protocol):
         """Probability of the likeliest answer, a fraction."""
 
     @property
-    def misfit(self) -> Misfit | None:
-        """The conversion from an excess to a misfit; None where it is not known."""
+    def misfit(self) -> Misfit:
+        """The conversion from an excess to a misfit."""
 
     @property
-    def maps(self) -> Maps | None:
-        """The data of the figures; None for an answer without them."""
+    def windy(self) -> bool:
+        """Whether any run had wind; True for an answer without the data of its figures."""
 
     @property
     def remarks(self) -> tuple[Remark, ...]:

@@ -8,7 +8,6 @@ from itertools import pairwise
 
 from diagnosis.findings.disturbed_runs import disturbed_step
 from diagnosis.findings.input_hold import hold_steps
-from diagnosis.findings.misfit import misfit_shown, windy
 from diagnosis.findings.next_run import OTHER_INPUT, NextRun, source_of_width
 from diagnosis.findings.next_step import NextStep
 from diagnosis.findings.patch import model_steps
@@ -152,7 +151,7 @@ def shares_of_gap(answer: Findings) -> dict[str, tuple[float, str]]:
 def _expected(answer: Findings) -> str:
     """What a further diagnosis should find."""
     gap = answer.gap
-    before, after = (misfit_shown(answer, value) for value in (gap.excess_before, gap.excess_after))
+    before, after = (gap.misfit.words(value) for value in (gap.excess_before, gap.excess_after))
     if answer.rest is None or not answer.rest_is_significant:
         after = "nothing beyond the noise"
     return f"the misfit should fall from {before} to {after}"
@@ -231,7 +230,7 @@ def _deciding(answer: Findings) -> Iterator[NextStep]:
         return
     # stated, and can be chosen
     springs = not robot and not unplannable(answer) and answer.model is None
-    kinds = ["springs"] * springs + ["wind speeds"] * windy(answer)
+    kinds = ["springs"] * springs + ["wind speeds"] * answer.windy
     kinds += ["inputs" if answer.found.driven else "release angles"]
     yield NextStep(f"Add runs with other {plain(*kinds)}", "these runs leave the answer undecided")
 
@@ -242,7 +241,7 @@ def _look(answer: Findings) -> NextStep:
     named = f", in {listed(list(runs))}" if place is not None and 0 < len(runs) < min(place.runs, 6) else ""
     what = "the rig" if channel is None else f"what acts on {CHANNELS[channel]}"
     wind = f" {CONDITIONS['wind_on']}" if answer.where.condition == "wind_on" else ""
-    size = misfit_shown(answer, answer.gap.excess_before)
+    size = answer.misfit.words(answer.gap.excess_before)
     return NextStep(
         f"Examine {what}{wind}{named}, where the model departs from the runs",
         f"the cause makes a misfit of {size}",

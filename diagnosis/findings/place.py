@@ -9,7 +9,6 @@ from typing import Any, Final
 
 from diagnosis.findings.finding import Picture
 from diagnosis.findings.judged import Judged
-from diagnosis.findings.misfit import unit_of, windy
 from diagnosis.findings.place_figures import (
     backbone_figure,
     moment_figure,
@@ -22,6 +21,7 @@ from diagnosis.findings.place_figures import (
 from diagnosis.findings.terms import BANDS, CHANNELS, CONDITIONS, scattering
 from diagnosis.model.fact import Fact
 from diagnosis.where.described import BETWEEN_RUNS, Nowhere, PlaceFound, Where
+from diagnosis.where.maps import Maps
 from identification.show.blocks import TextTable
 from identification.show.numbers import p_text, part, plain, reading_shown, share, significant, unit_shown
 from tunnel_sim.effects.capabilities import SecondOscillation
@@ -203,30 +203,33 @@ def place_rows(where: Where, judged: Judged) -> tuple[tuple[str, str], ...]:
         ends = [significant(factor * value, 3) for value in interval or ()]
         rows.append((label, f"{' to '.join(ends)}{unit}" if ends else "–"))
     rows.append(("Acts on", CHANNELS.get(where.channel or "", _UNDETERMINED)))
-    if windy(judged):
+    if judged.windy:
         condition = where.condition
         rows.append(("Acts", _UNDETERMINED if condition is None else CONDITIONS[condition]))
     return tuple(rows)
 
 
-def lines_table(judged: Judged) -> TextTable:
-    """Narrow lines in the residuals."""
+def lines_table(maps: Maps | None, unit: str) -> TextTable:
+    """Narrow lines in the residuals.
+
+    Args:
+        unit: of the readings.
+    """
     rows = tuple(
         (
             line.run,
             significant(line.frequency_hz, 4),
-            reading_shown(line.amplitude_rad, 2, unit_of(judged)),
+            reading_shown(line.amplitude_rad, 2, unit),
             share(min(line.share, 1.0)),
         )
-        for line in (judged.maps.lines if judged.maps else ())
+        for line in (maps.lines if maps else ())
     )
     heads = ("run", "frequency [Hz]", "amplitude", "share of the run's gap")
     return TextTable("Narrow lines in the residuals", heads, rows, right=heads[1:])
 
 
-def place_pictures(where: Where, judged: Judged) -> tuple[Picture, ...]:
+def place_pictures(where: Where, maps: Maps | None, judged: Judged) -> tuple[Picture, ...]:
     """The place of the gap in the data of the figures; none without data, and no map without a gap."""
-    maps = judged.maps
     if maps is None:
         return ()
     axis = "time" if maps.grid.wind_speeds is None else "the wind speed"
@@ -235,7 +238,7 @@ def place_pictures(where: Where, judged: Judged) -> tuple[Picture, ...]:
         f"Misfit of the nominal model, fitted to all runs, by the amplitude of the motion and {axis}. Empty cells "
         "hold no sample or are within three standard deviations of the noise.",
         "Map of the misfit of the nominal model by amplitude and wind speed, or by amplitude and time.",
-        partial(place_figure, judged),
+        partial(place_figure, maps.grid, judged.misfit),
     )
     return (
         *([place] if judged.causes else []),

@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from diagnosis.findings.judged import Judged
-from diagnosis.findings.misfit import misfit_scale, run_labels
+from diagnosis.findings.misfit import Misfit, run_labels
 from diagnosis.where.along_motion import PhasePlane
 from diagnosis.where.described import Where
-from diagnosis.where.maps import ExcessSpectrum, Maps
+from diagnosis.where.maps import ExcessMap, ExcessSpectrum, Maps
 from identification.show.drawing import (
     AFTER,
     BEFORE,
@@ -43,8 +42,6 @@ if TYPE_CHECKING:
 
 TIME = "time since the start of the record [s]"
 LEAST_POWER = 0.3  # of the noise: smaller values are drawn at the edge of the axis
-PLACE_HEIGHT = 2.7
-"""Height of the map of where the gap is, inches."""
 ANGLE, RATE = "angle β [°]", "rate β̇/ω [°]"
 _MOST_CURVES = len(COLOURS)
 _LONG = 30  # characters of a label
@@ -52,24 +49,18 @@ _LEGEND, _HANDLE = 62, 8  # characters: the width of the figure, and the line be
 
 
 @styled
-def place_figure(judged: Judged, height: float = PLACE_HEIGHT) -> Figure | None:
-    """Misfit by amplitude and by wind speed, or by time where there is one speed; None without maps.
+def place_figure(cells: ExcessMap, misfit: Misfit) -> Figure:
+    """Misfit by amplitude and by wind speed, or by time where there is one speed.
 
-    Cells within the noise are empty.
-
-    Args:
-        height: of the figure, inches; small enough for a phone.
+    Cells within the noise are empty. The figure is small enough for a phone.
     """
-    if judged.maps is None:
-        return None
-    unit, size = misfit_scale(judged)
-    cells = judged.maps.grid
+    unit, size = misfit.scale()
     rows = np.degrees(cells.amplitude_edges_rad)
     speeds = [] if cells.wind_speeds is None else cells.wind_speeds.tolist()
     columns = np.arange(len(speeds) + 1) - 0.5 if cells.time_edges_s is None else cells.time_edges_s
     sizes = np.vectorize(size, otypes=[float])(np.nan_to_num(cells.excess))
     shown = np.where(cells.excess > SIGMAS * cells.std, sizes, np.nan)
-    fig = figure(NARROW, height)
+    fig = figure(NARROW, 2.7)
     axes = fig.add_subplot()
     top = float(np.nanmax(shown)) if np.isfinite(shown).any() else 1.0
     mesh = axes.pcolormesh(columns, rows, shown, cmap=faded(BEFORE), vmin=0.0, vmax=top)

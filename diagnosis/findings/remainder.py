@@ -16,7 +16,6 @@ from diagnosis.findings.finding import Picture
 from diagnosis.findings.hidden import Hidden
 from diagnosis.findings.judged import Judged
 from diagnosis.findings.judgements import Estimates
-from diagnosis.findings.misfit import rms_shown
 from diagnosis.findings.terms import KINDS, scattering
 from diagnosis.likelihood.ceiling import Ceiling
 from diagnosis.noise.gap import gap_test
@@ -29,7 +28,6 @@ from identification.show.blocks import TextTable
 from identification.show.drawing import AFTER, BEFORE, NARROW, colour_bar, faded
 from identification.show.numbers import (
     change_up_to,
-    left_over,
     listed,
     part,
     percent,
@@ -102,11 +100,11 @@ class Remainder:
         rest, causes = self, judged.causes
         after, named = judged.coefficients_after, judged.names_effects
         moves, excess, misfit = rest.moves, rest.excess, judged.misfit
-        size = left_over(excess) if misfit is None else f"{rms_shown(misfit, excess)} root mean square"
+        size = f"{misfit.rms_words(excess)} root mean square"
         larger = (
             excess > 1.0
         )  # than the noise: people see it in the fit, whatever it does to the coefficients
-        if larger and misfit is not None:
+        if larger:
             size = f"{size}, {significant(math.sqrt(excess), 2)} times the noise"
         left = f"the residual ({size})" if named else "the gap"
         subject = f"Part of the gap remains: {left}" if named and larger else left[0].upper() + left[1:]

@@ -10,7 +10,7 @@ import numpy as np
 
 from diagnosis.answer.held_out import ON_RUNS, Base, HeldOut, Waterfall, share_closed
 from diagnosis.findings.closure import FITTED, Confirmation, GapSummary, RunGap
-from diagnosis.findings.judged import Misfit
+from diagnosis.findings.misfit import Misfit
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.motions import blocks_beyond, campaign_rig, condensed, sample_means
 from diagnosis.likelihood.problem import Problem

@@ -20,7 +20,6 @@ from diagnosis.findings.coefficients import (
     hidden_table,
 )
 from diagnosis.findings.head import Head
-from diagnosis.findings.misfit import misfit_of, of_swing, rms_shown, windy
 from diagnosis.findings.next_steps import next_steps, rival_lines
 from diagnosis.findings.patch import patch_line, patch_table
 from diagnosis.findings.place import lines_table, place_rows
@@ -54,7 +53,7 @@ def sections(answer: Findings, campaign: Campaign | None = None) -> tuple[Sectio
     Args:
         campaign: adds the conditions of the runs.
     """
-    blown = bool(campaign.in_wind) if campaign else windy(answer)
+    blown = bool(campaign.in_wind) if campaign else answer.windy
     listed = (
         Head.of(answer).section,
         Section("answer", "The answer", (Paragraph(str(answer.verdict)),)),
@@ -113,7 +112,7 @@ def _where(answer: Findings) -> Section:
     return Section(
         "where",
         "Where the model departs from the runs",
-        (words, *place, *figures, Detail((lines_table(answer),))),
+        (words, *place, *figures, Detail((lines_table(answer.maps, answer.misfit.unit),))),
     )
 
 
@@ -160,7 +159,12 @@ def _how_far(answer: Findings, campaign: Campaign | None) -> Section:
     return Section(
         "how-far-section",
         "How much of the gap is explained, run by run",
-        (waterfall_table(answer.waterfall, answer), drawn, runs, Detail((Paragraph(meaning, kind="small"),))),
+        (
+            waterfall_table(answer.waterfall, answer.misfit),
+            drawn,
+            runs,
+            Detail((Paragraph(meaning, kind="small"),)),
+        ),
     )
 
 
@@ -262,8 +266,8 @@ def _provenance(answer: Findings) -> Section:
         "Tests, noise and provenance",
         (
             Detail((tests, Paragraph(false, kind="small"))),
-            Paragraph(noise_line(answer.noise, answer)),
-            Paragraph(model_line(answer.confirmation, answer)),
+            Paragraph(noise_line(answer.noise, answer.misfit.unit)),
+            Paragraph(model_line(answer.confirmation, answer.misfit.unit)),
             Detail(
                 (
                     Heading("Units and terms"),
@@ -305,10 +309,11 @@ def diagnosis_brief(answer: Findings) -> str:
     named = named_answer(causes).lower() if causes else "no gap"
     decided = answer.decision.decided
     undecided = "" if decided else f"undecided, the {answer.set_out} is "
-    misfit, excess = misfit_of(answer), gap.excess_before
-    size = f"{held_out_excess(excess)} times the noise variance"
-    if misfit is not None:
-        size = f"{rms_shown(misfit, excess)} root mean square, {of_swing(misfit, excess)} ({size})"
+    misfit, excess = answer.misfit, gap.excess_before
+    size = (
+        f"{misfit.rms_words(excess)} root mean square, {misfit.swing_words(excess)} "
+        f"({held_out_excess(excess)} times the noise variance)"
+    )
     closed = f"; {share(gap.closed)} explained {gap.closed_on}" if answer.names_effects else ""
     likely = probability(first.probability)
     return (

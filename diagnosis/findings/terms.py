@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from diagnosis.findings.judged import Judged
-from diagnosis.findings.misfit import windy
 from identification.show.numbers import plain
 from tunnel_sim.effects import BetweenRuns
 from tunnel_sim.effects.registry import ALL_EFFECTS, known_effects
@@ -66,7 +65,7 @@ def acts_on(answer: Judged, effect: str) -> str:
     kind = {kind.name: kind for kind in known_effects()}.get(effect)
     if kind is None:
         return ""
-    return f"{CHANNELS[kind.channel]}{f', {CONDITIONS[kind.condition]}' if windy(answer) else ''}"
+    return f"{CHANNELS[kind.channel]}{f', {CONDITIONS[kind.condition]}' if answer.windy else ''}"
 
 
 SCATTERS = {kind.name: kind.scatters for kind in ALL_EFFECTS if issubclass(kind, BetweenRuns)}

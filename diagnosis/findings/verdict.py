@@ -8,7 +8,6 @@ from typing import Any, Final
 from diagnosis.findings.coefficients import consequence
 from diagnosis.findings.disturbed_runs import disturbed_words
 from diagnosis.findings.input_hold import hold_words
-from diagnosis.findings.misfit import misfit_of, of_swing, rms_shown, unit_of
 from diagnosis.findings.other_motions import second_mode_words
 from diagnosis.findings.patch import model_words
 from diagnosis.findings.spring_choices import choice_words, two_springs_words
@@ -30,7 +29,6 @@ from identification.show.numbers import (
     probability,
     rounded_up,
     share,
-    times_noise,
 )
 from tunnel_sim.effects import effect_class, known_effects, the_effect
 from tunnel_sim.effects.capabilities import InputClock
@@ -113,9 +111,7 @@ def _answer(answer: Findings, rest: str) -> str:
             f"(the residual is {beside_noise(excess)}, root mean square)."
         )
         return " ".join(filter(None, (sentence, repeats)))
-    size, misfit = times_noise(excess), misfit_of(answer)
-    if misfit is not None:
-        size = f"{rms_shown(misfit, excess)} root mean square, {of_swing(misfit, excess)}"
+    size = f"{gap.misfit.rms_words(excess)} root mean square, {gap.misfit.swing_words(excess)}"
     there_is = f"There is a gap ({size})."
     proper = without_scatter(causes)
     explained = f"{share(gap.closed)} of the gap {gap.closed_on}."
@@ -240,7 +236,7 @@ _NO_CHANGE = 0.01  # %: smaller changes are shown as this
 def _with_second_modes(said_first: str, answer: Findings) -> list[str]:
     """The answer and the second modes of single runs; the modes come first where every run has one."""
     modes = answer.found.second_modes
-    said = [second_mode_words(one, unit_of(answer)) for one in modes]
+    said = [second_mode_words(one, answer.misfit.unit) for one in modes]
     of_all = {one.run for one in modes} >= {run.id for run in answer.gap.runs}
     return [*said, said_first] if of_all else [said_first, *said]
 

@@ -20,8 +20,8 @@ from diagnosis.findings.finding import Answered, Finding, Picture, Pictured
 from diagnosis.findings.friction_curve import FrictionCurve
 from diagnosis.findings.hidden import Hidden
 from diagnosis.findings.input_hold import OtherHold
-from diagnosis.findings.judged import Misfit
 from diagnosis.findings.judgements import Nearly
+from diagnosis.findings.misfit import Misfit
 from diagnosis.findings.next_run import FurtherRuns, NextRun
 from diagnosis.findings.other_motions import TwoModes
 from diagnosis.findings.place import place_pictures
@@ -173,8 +173,8 @@ class Findings:
             one.name: one
             for one in (
                 *drawn,
-                *place_pictures(self.where, self),
-                *closure_pictures(self.gap, self.waterfall, self),
+                *place_pictures(self.where, self.maps, self),
+                *closure_pictures(self.gap, self.waterfall, self.maps, self),
                 *law_pictures(self.closable),
             )
         }
@@ -195,9 +195,14 @@ class Findings:
         return self.decision.credible[0][1]
 
     @property
-    def misfit(self) -> Misfit | None:
-        """The conversion from an excess to a misfit; None where it is not known."""
+    def misfit(self) -> Misfit:
+        """The conversion from an excess to a misfit."""
         return self.gap.misfit
+
+    @property
+    def windy(self) -> bool:
+        """Whether any run had wind; True for an answer without the data of its figures."""
+        return self.maps is None or self.maps.windy
 
     @property
     def repeated(self) -> RunRepeatability:

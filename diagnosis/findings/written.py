@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from diagnosis.findings.cautions import CAUTIONS, NOISE, PATCH, remark, said
 from diagnosis.findings.coefficients import coefficient_note
-from diagnosis.findings.misfit import unit_of
 from diagnosis.findings.place import where_words
 from diagnosis.findings.remainder import closable_words
 from diagnosis.findings.verdict import verdict
@@ -48,7 +47,7 @@ def sentences(answer: Findings) -> Sentences:
         "" if answer.rest is None else answer.rest.in_words(answer),
         answer.model,
     )
-    unit = unit_of(answer)
+    unit = answer.misfit.unit
     return Sentences(
         verdict=verdict(answer, rest),
         where=where_words(answer.where, answer.found.place or answer.found.nowhere, answer),

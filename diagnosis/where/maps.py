@@ -5,6 +5,7 @@ An excess is the mean squared residual over the noise variance, minus one, a rat
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, is_dataclass, replace
 from typing import Any
 
@@ -195,6 +196,16 @@ class Maps:
     grid: ExcessMap
     unit: str
     traces: tuple[RunTrace, ...]
+
+    @property
+    def windy(self) -> bool:
+        """Whether any run had wind."""
+        return any(run.wind_speed > 0.0 for run in self.runs)
+
+    @property
+    def excess_std(self) -> float:
+        """Standard deviation of the campaign's excess by chance, in noise variances."""
+        return math.sqrt(sum(run.std**2 for run in self.runs)) / len(self.runs)
 
     def rounded(self) -> Maps:
         """The same with the digits of a document in its arrays."""

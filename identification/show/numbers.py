@@ -301,18 +301,6 @@ def unit_shown(unit: str) -> tuple[str, float]:
     return {"rad": "°", "rad/s": "°/s", "rad/s2": "°/s²"}[unit], math.degrees(1.0)
 
 
-def times_noise(value: float) -> str:
-    """A gap in words, such as ``2.75 times the noise variance``, from its excess, a ratio."""
-    return f"{significant(value, 4) if value >= 10.0 else f'{value:.2f}'} times the noise variance"
-
-
-def left_over(excess: float) -> str:
-    """A residual gap, such as ``9.6 times the noise variance``, a ratio."""
-    least = 1e-3
-    size = f"less than {least:g}" if excess < least else significant(excess, 2)
-    return f"{size} times the noise variance"
-
-
 def beside_noise(excess: float) -> str:
     """A residual in multiples of the noise, root mean square, such as ``0.999 times the noise``.
 

@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from diagnosis.findings.candidates import Candidate
 from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary, RunGap
 from diagnosis.findings.coefficients import Coefficients
+from diagnosis.findings.misfit import Misfit
 from diagnosis.where.described import Where
 from tests.fuzz.campaigns import free_decays
 from tests.fuzz.tables import parquet
@@ -223,7 +224,8 @@ def answer_document() -> dict[str, Any]:
         "cn_r": Quantity(-0.1, 0.01, "1/rad"),
     }
     friction = {"friction_moment": Quantity(0.004, 1e-5, "N m")}
-    gap = GapSummary(True, 2.0, 0.1, 0.99, ON_RUNS, (RunGap("r1", 2.0, 0.1),), 1e-3, 1e-9, {"lag": 1e-9})
+    runs, misfit = (RunGap("r1", 2.0, 0.1),), Misfit(5e-4, 0.1, "rad")
+    gap = GapSummary(True, 2.0, 0.1, 0.99, ON_RUNS, runs, 1e-3, 1e-9, {"lag": 1e-9}, misfit)
     return Diagnosis(
         "c1", ("coulomb_friction",), gap,
         Where("damping", "always", ("r1",), (0.0, 1.0), (0.0, 0.1)),

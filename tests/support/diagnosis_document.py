@@ -60,7 +60,8 @@ _PARTS: Mapping[str, Any] = {
     "common": {"effects": {}, "channels": {}},
     "gap": {
         "detected": False, "excess_before": 0.0, "excess_after": 0.0, "closed": 0.0, "closed_on": "", "runs": [],
-        "false_alarm_rate": 0.01, "p_value": 1.0,
+        "false_alarm_rate": 0.01, "p_value": 1.0, "tests": {},
+        "misfit": {"noise": 1.0, "swing": 1.0, "unit": "rad"},
     },
     "where": {"channel": None, "condition": None},
     "candidates": [{"excess_after": 0.0, "closed": 0.0}],

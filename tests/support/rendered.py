@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from diagnosis.findings import answers, closure, coefficients, place, place_figures, remainder, symbols
+from diagnosis.findings import answers, closure, coefficients, place, remainder, symbols
 from diagnosis.findings.sections import EFFECT_LISTED
 from diagnosis.findings.whole import Findings
 from identification.show.blocks import TextTable
@@ -70,7 +70,7 @@ def where_words(answer: Findings) -> str:
 
 
 def lines_table(answer: Findings) -> TextTable:
-    return place.lines_table(answer)
+    return place.lines_table(answer.maps, answer.misfit.unit)
 
 
 def place_rows(answer: Findings) -> tuple[tuple[str, str], ...]:
@@ -82,7 +82,7 @@ def runs_table(answer: Findings, campaign: object = None) -> TextTable:
 
 
 def waterfall_table(answer: Findings) -> TextTable:
-    return closure.waterfall_table(answer.waterfall, answer)
+    return closure.waterfall_table(answer.waterfall, answer.misfit)
 
 
 def tests_table(answer: Findings) -> TextTable:
@@ -90,11 +90,11 @@ def tests_table(answer: Findings) -> TextTable:
 
 
 def noise_line(answer: Findings) -> str:
-    return closure.noise_line(answer.noise, answer)
+    return closure.noise_line(answer.noise, answer.misfit.unit)
 
 
 def model_line(answer: Findings) -> str:
-    return closure.model_line(answer.confirmation, answer)
+    return closure.model_line(answer.confirmation, answer.misfit.unit)
 
 
 def coefficients_table(answer: Findings) -> TextTable:
@@ -144,4 +144,4 @@ repeatability_figure, runs_figure, profiles_figure = (
 )
 spectrum_figure, backbone_figure = drawn("where-spectrum"), drawn("where-backbones")
 phase_plane_figure, moment_figure = drawn("where-phase-plane"), drawn("where-moment")
-place_figure = place_figures.place_figure
+place_figure = drawn("place")

@@ -319,7 +319,6 @@ class ByHandPart:
 
 def show_closure(closure: Closure, answer: Diagnosis) -> None:
     """The closure with causes chosen by hand, in the units of the diagnosis' document."""
-    from diagnosis.findings.misfit import misfit_shown
     from identification.show.numbers import estimated, share, unit_mark
 
     def size(given: Quantity) -> str:
@@ -328,8 +327,8 @@ def show_closure(closure: Closure, answer: Diagnosis) -> None:
     show_facts(
         [
             (share(closure.closed), f"explained {closure.held_out}"),
-            (misfit_shown(answer, closure.after), "residual misfit, root mean square"),
-            (misfit_shown(answer, closure.before), "with the nominal model"),
+            (answer.misfit.words(closure.after), "residual misfit, root mean square"),
+            (answer.misfit.words(closure.before), "with the nominal model"),
         ]
     )
     ui.linear_progress(closure.closed, show_value=False).props('aria-label="share of the gap explained"')
@@ -364,11 +363,10 @@ class _Rivals:
     """Fields for two answers, and the run that would distinguish them."""
 
     def __init__(self, session: Session, answer: Diagnosis) -> None:
-        from diagnosis.findings.misfit import windy
         from tunnel_sim.effects import known_effects
 
         self._session, self._left_out, self._settings = session, left_out_of(answer), answer.settings
-        blown = windy(answer)  # an effect of the wind cannot be fitted to runs without wind
+        blown = answer.windy  # an effect of the wind cannot be fitted to runs without wind
         fitted = {
             kind.name: plain(kind.name)
             for kind in known_effects()

@@ -140,7 +140,7 @@ def show_faults(plan: CampaignPlan, campaign: Campaign, answer: Diagnosis) -> No
         )
         say(f"Planted: {effect.name}, {', '.join(sizes)}")
     say(f"\nFound, from the records alone:\n{answer.verdict}\n")
-    show([found_table(plan, answer), waterfall_table(answer.waterfall, answer)])
+    show([found_table(plan, answer), waterfall_table(answer.waterfall, answer.misfit)])
 
 
 def found_table(plan: CampaignPlan, answer: Diagnosis) -> TextTable:

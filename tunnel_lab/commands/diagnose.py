@@ -345,13 +345,12 @@ def comparison_tables(names: Sequence[str], answers: Sequence[Diagnosis]) -> lis
         names: of the diagnoses, each different.
         answers: the reference first.
     """
-    from diagnosis.findings.misfit import excess_std
     from identification.show.numbers import probability, share
 
     def excess(answer: Diagnosis, value: float) -> str:
         """An excess with its standard deviation by chance, where the diagnosis has the noise of its runs."""
-        std = excess_std(answer)
-        return f"{value:.4g}" if std is None else with_std(value, std)
+        maps = answer.maps
+        return f"{value:.4g}" if maps is None else with_std(value, maps.excess_std)
 
     rows_of_answers = (
         ("gap [× noise variance]", *(excess(d, d.gap.excess_before) for d in answers)),

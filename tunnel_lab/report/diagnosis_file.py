@@ -47,9 +47,6 @@ def _check(found: Diagnosis) -> None:
         dimension(given.unit)
         if given.std is not None and given.std < 0.0:
             raise ValueError(f"a standard deviation is {given.std:g}")
-    units = {
-        *([found.maps.unit] if found.maps else []),
-        *([found.gap.misfit.unit] if found.gap.misfit else []),
-    }
+    units = {found.gap.misfit.unit, *([found.maps.unit] if found.maps else [])}
     for unit in units - READING_UNITS:
         raise ValueError(f"{unit!r} is no unit of a reading")

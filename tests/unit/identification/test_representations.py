@@ -12,6 +12,7 @@ from diagnosis import Candidate, Coefficients, Diagnosis, GapSummary, RunGap, Wh
 from diagnosis.answer.held_out import ON_RUNS
 from diagnosis.findings.closure import Confirmation, NoiseSummary
 from diagnosis.findings.decision import decision
+from diagnosis.findings.misfit import Misfit
 from diagnosis.settings import Settings
 from identification import Estimate, Quantity, Remark, RunEstimate, Status, WindowEstimate
 from identification.show.blocks import (
@@ -139,6 +140,8 @@ def diagnosis() -> Diagnosis:
             (RunGap("a", 19.0, 0.01), RunGap("b", 18.0, 0.02, False)),
             0.01,
             1e-9,
+            {},
+            Misfit(5e-4, 0.1, "rad"),
         ),
         where=Where("damping", "always"),
         candidates=(

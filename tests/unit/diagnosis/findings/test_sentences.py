@@ -11,6 +11,7 @@ from diagnosis.findings.cautions import CAUTIONS, NOISE, PATCH, remark, said
 from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary
 from diagnosis.findings.coefficients import Coefficients, size_note
 from diagnosis.findings.decision import decision
+from diagnosis.findings.misfit import Misfit
 from diagnosis.findings.place import REASONS, reason
 from diagnosis.findings.terms import KINDS
 from diagnosis.findings.whole import Found
@@ -317,7 +318,8 @@ def test_an_answer_in_words_has_all_of_them_and_writes_them_once() -> None:
         noted=(Noted(("a",), Fact("not judged")),),
     )
     answer = Diagnosis(
-        "c", (), GapSummary(False, 0.01, 0.01, 0.0, "", (), 1e-3, 0.5), Where(None, None),
+        "c", (), GapSummary(False, 0.01, 0.01, 0.0, "", (), 1e-3, 0.5, {}, Misfit(5e-4, 0.1, "rad")),
+        Where(None, None),
         (Candidate("none", 1.0, 0.01, 0.0),), (), None,
         Coefficients(value, value), Confirmation(True, 0.0, "a", 0.0, 1e-5), noise,
         decision((("none", 1.0),), Settings().answer), found=found,

@@ -12,8 +12,8 @@ from diagnosis.findings.candidates import Candidate
 from diagnosis.findings.closure import FITTED, GapSummary, RunGap
 from diagnosis.findings.decision import Predictions, decision
 from diagnosis.findings.head import Head
-from diagnosis.findings.judged import Misfit
 from diagnosis.findings.judgements import Nearly, immaterial, nearly
+from diagnosis.findings.misfit import Misfit
 from diagnosis.findings.next_steps import next_steps, rival_lines
 from diagnosis.findings.reported import held_out_totals
 from diagnosis.findings.sections import diagnosis_brief
@@ -34,7 +34,7 @@ def gap(*held_out: bool) -> GapSummary:
     runs = tuple(RunGap(f"r{i}", 2.0, 0.1, held_out=held) for i, held in enumerate(held_out))
     misfit = Misfit(0.002, 0.1, "rad")
     return GapSummary(
-        True, 2.0, 0.1, 0.95, ON_RUNS if any(held_out) else FITTED, runs, 0.01, 1e-9, misfit=misfit
+        True, 2.0, 0.1, 0.95, ON_RUNS if any(held_out) else FITTED, runs, 0.01, 1e-9, {}, misfit
     )
 
 

@@ -39,7 +39,7 @@ def after(tmp_path: Path) -> Path:
         campaign="after",
         causes=[],
         ambiguous_with=[],
-        gap=document()["gap"] | calm | {"misfit": None},
+        gap=document()["gap"] | calm,
         candidates=[document()["candidates"][4] | {"probability": 0.9876}],
         coefficients={"before": estimates, "after": estimates},
         maps=None,

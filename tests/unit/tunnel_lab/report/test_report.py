@@ -14,7 +14,7 @@ from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary, R
 from diagnosis.findings.coefficients import Coefficients
 from diagnosis.findings.decision import decision
 from diagnosis.findings.friction_curve import FrictionCurve, FrictionPoint
-from diagnosis.findings.judged import Misfit
+from diagnosis.findings.misfit import Misfit
 from diagnosis.findings.next_run import NextRun
 from diagnosis.likelihood.ceiling import Ceiling
 from diagnosis.likelihood.least_squares import fit

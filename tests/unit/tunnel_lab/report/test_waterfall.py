@@ -66,13 +66,6 @@ def test_below_the_noise_it_ends_at_zero_and_says_so(given: Document) -> None:
     assert waterfall_figure(findings_of(given | {"waterfall": given["waterfall"][:1]})) is None
 
 
-def test_a_document_without_misfit_is_drawn_in_the_noise(given: Document) -> None:
-    del given["gap"]["misfit"]
-    axes = axes_of(given)
-    assert dots(axes)[0] == (pytest.approx(np.sqrt(28.45)), 0)
-    assert axes.get_xlabel() == "root mean square misfit [noise std]"
-
-
 def key(axes: Any) -> set[str]:
     return {text.get_text() for text in axes.legend_.get_texts()} if axes.legend_ else set()
 

@@ -14,6 +14,7 @@ from diagnosis.findings.candidates import Candidate
 from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary
 from diagnosis.findings.coefficients import Coefficients
 from diagnosis.findings.decision import Predictions, decision
+from diagnosis.findings.misfit import Misfit
 from diagnosis.where.described import Where
 from identification.show.quantity import Quantity
 from identification.statistics import Proportion
@@ -28,7 +29,7 @@ def document(causes, *, probability=0.9, closed=0.99, rivals=(), cn=(0.45, -0.12
     values = {k: Quantity(v, s, "1/rad") for k, v, s in zip(("cn_beta", "cn_r"), cn, std, strict=True)}
     return Diagnosis(
         "c", tuple(causes),
-        GapSummary(bool(causes), 2.0, 0.1, closed, ON_RUNS, (), 0.001, 0.5),
+        GapSummary(bool(causes), 2.0, 0.1, closed, ON_RUNS, (), 0.001, 0.5, {}, Misfit(5e-4, 0.1, "rad")),
         Where(None, None), (Candidate(name, probability, 0.1, closed),), tuple(rivals), None,
         Coefficients(values, values), Confirmation(True, 0.0, "r01", 0.0, 1e-5),
         NoiseSummary(5e-4, None, "estimated", ""),
