@@ -11,9 +11,13 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 import polars as pl
 
+from diagnosis.findings.cautions import CAUTIONS, NOISE, PATCH, remark, said
+from diagnosis.findings.coefficients import coefficient_note
+from diagnosis.findings.place import where_words
+from diagnosis.findings.remainder import closable_words
 from diagnosis.findings.sections import diagnosis_brief, printed
+from diagnosis.findings.verdict import verdict
 from diagnosis.findings.whole import Findings
-from diagnosis.findings.written import sentences
 from identification.estimate import as_pandas, correlated, wide_frame
 from identification.show.blocks import as_notebook, as_text
 from tunnel_sim.files.writing import as_json
@@ -31,18 +35,21 @@ class Diagnosis(Findings):
 
     def in_words(self) -> Diagnosis:
         """The answer with its text fields, and the remarks on the noise after those of the examination."""
-        said = sentences(self)
+        found, model, unit = self.found, self.model, self.misfit.unit
+        rest = self.rest and replace(self.rest, words=self.rest.in_words(self))
+        place = where_words(self.where, found.place or found.nowhere, self)
+        noted = (remark(one, unit) for one in found.noted)
         return replace(
             self,
-            verdict=said.verdict,
-            where=replace(self.where, words=said.where),
-            rest=self.rest and replace(self.rest, words=said.rest),
-            closable=self.closable and replace(self.closable, words=said.closable),
-            coefficients=replace(self.coefficients, note=said.note),
-            noise=replace(self.noise, reason=said.noise),
-            cautions=said.cautions,
-            remarks=(*self.remarks, *(remark for remark in said.remarks if remark not in self.remarks)),
-            model=self.model and replace(self.model, notes=said.patch),
+            verdict=verdict(self, rest.words if rest else ""),
+            where=replace(self.where, words=place),
+            rest=rest,
+            closable=self.closable and replace(self.closable, words=closable_words(self.closable, self)),
+            coefficients=replace(self.coefficients, note=coefficient_note(self.coefficients, self)),
+            noise=replace(self.noise, reason="" if found.noise is None else said(NOISE, found.noise, unit)),
+            cautions=tuple(said(CAUTIONS, one, unit) for one in found.cautions),
+            remarks=(*self.remarks, *(one for one in noted if one not in self.remarks)),
+            model=model and replace(model, notes=tuple(said(PATCH, one) for one in model.differences)),
         )
 
     def with_hashes(self, hashes: Mapping[str, str]) -> Self:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from diagnosis.findings.candidates import Candidate
-from diagnosis.findings.judged import Judged
+from diagnosis.findings.finding import Judged
 from diagnosis.findings.repeatability import RunRepeatability
 from diagnosis.findings.terms import answer_name, scattering
 from identification.show.blocks import TextTable

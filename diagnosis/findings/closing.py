@@ -1,16 +1,40 @@
-"""The explained share of the gap on held-out readings, and the answer without causes that these do not confirm."""
+"""The gap before and after the causes, by MuJoCo and on held-out readings; causes that these do not confirm go."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Final
 
-from diagnosis.answer.held_out import Waterfall, excess_base, predict_held_out, share_ahead, waterfall
-from diagnosis.findings.closure import Confirmation, GapSummary
-from diagnosis.findings.reported import gap_summary, held_out_totals, report_fits
+import numpy as np
+
+from diagnosis.answer.held_out import (
+    ON_RUNS,
+    Base,
+    HeldOut,
+    Waterfall,
+    excess_base,
+    predict_held_out,
+    share_ahead,
+    share_closed,
+    waterfall,
+)
+from diagnosis.findings.closure import FITTED, Confirmation, GapSummary, RunGap
+from diagnosis.findings.misfit import Misfit
+from diagnosis.likelihood.least_squares import Fit
+from diagnosis.likelihood.motions import blocks_beyond, campaign_rig, condensed, sample_means
+from diagnosis.likelihood.problem import Problem
+from diagnosis.model.parameters import Point
+from diagnosis.search.prepared import COARSE_STEP
 from diagnosis.search.study import Study
+from tunnel_sim.physics.run_settings import released_by_spring_end
+from tunnel_sim.physics.steps import report_substeps
+from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
+
+INTEGRATOR_TOLERANCE: Final = 0.1
+"""Maximum difference between MuJoCo and the integrator of the fits, in std of a block mean. Judgement."""
 
 
 @dataclass(frozen=True)
@@ -75,3 +99,233 @@ def _without_needless(study: Study, steps: Waterfall) -> Study | None:
     if best == whole or parts[best] > steps.steps[-1].excess:
         return None
     return study.of_part(tuple(sorted(best)))
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Runs predicted by the MuJoCo model and by the forward integrator of the fits.
+
+    Args:
+        ids: of the runs.
+        residuals: reading minus the MuJoCo model's block means, in noise standard deviations, by run; those of the
+            forward integrator where MuJoCo could not integrate the motion.
+        differences: MuJoCo's block means minus the forward integrator's, rad, by run.
+        noise: standard deviation of a block mean's noise, rad, by run.
+        failure: why MuJoCo could not predict the runs; empty where it could.
+        shifts: the differences in noise standard deviations, whitened like the residuals, by run.
+    """
+
+    ids: tuple[str, ...]
+    residuals: list[Array]
+    differences: list[Array]
+    noise: tuple[float, ...]
+    failure: str = ""
+    shifts: list[Array] = field(default_factory=list)
+
+    @property
+    def excess(self) -> float:
+        """Mean squared scaled residual minus one, over all runs."""
+        return float(np.mean(np.concatenate(self.residuals) ** 2)) - 1.0
+
+
+def compare(problem: Problem, common: Array, release: Array) -> Comparison:
+    """Predict runs with both models.
+
+    Args:
+        common: common parameters, shape (common,), or (runs, common) where each run has its own, as for runs held
+            out of different fits.
+        release: every run's own parameters, shape (runs, own).
+    """
+    runs = problem.data.runs
+    each = np.broadcast_to(common, (len(runs), common.shape[-1]))
+    distinct, which = np.unique(each, axis=0, return_inverse=True)
+    forward = problem.predict([Point(row, release) for row in distinct])
+    before = [forward[int(k)][i] for i, k in enumerate(which.ravel())]
+    try:
+        predicted, failure = mujoco_blocks(problem, each, release), ""
+    except TunnelError as error:
+        predicted, failure = before, error.what
+    # a held-out run may diverge in both models
+    apart = [np.zeros_like(p) if failure else p - f for p, f in zip(predicted, before, strict=True)]
+    return Comparison(
+        ids=tuple(run.id for run in runs),
+        residuals=[run.scaled(run.reading - p) for run, p in zip(runs, predicted, strict=True)],
+        shifts=[run.scaled(difference) for run, difference in zip(runs, apart, strict=True)],
+        differences=apart,
+        noise=tuple(run.noise_std for run in runs),
+        failure=failure,
+    )
+
+
+def confirm(comparisons: Sequence[Comparison], tolerance: float) -> Confirmation:
+    """Judge whether the two models agree.
+
+    Args:
+        tolerance: greatest root mean square difference of a run over the noise of a block mean, a ratio.
+
+    Returns:
+        The largest difference, and the root mean square difference of the run closest to its tolerance.
+    """
+    largest, worst, found = 0.0, -1.0, ("", 0.0, 0.0)
+    for comparison in comparisons:
+        for run, difference, noise in zip(
+            comparison.ids, comparison.differences, comparison.noise, strict=True
+        ):
+            largest = max(largest, float(np.max(np.abs(difference))))
+            rms = float(np.sqrt(np.mean(difference**2)))
+            if rms / noise > worst:
+                worst, found = rms / noise, (run, rms, tolerance * noise)
+    failure = next((c.failure for c in comparisons if c.failure), "")
+    return Confirmation(worst <= tolerance and not failure, largest, *found, failure=failure)
+
+
+def mujoco_blocks(problem: Problem, common: Array, release: Array) -> list[Array]:
+    """Block means of the reading from the MuJoCo model.
+
+    Effects of the sensor act on every sample before averaging; the fits, which average first, only approximate
+    that.
+
+    Args:
+        common: common parameters of every run, shape (runs, common).
+        release: every run's own parameters, shape (runs, own).
+
+    Returns:
+        By run, rad, of the shape of the run's ``reading``.
+
+    Raises:
+        TunnelError: when the motion diverges.
+    """
+    from tunnel_sim.engine.simulate import simulate_motions  # only here: MuJoCo is slow to load
+
+    runs, rig = problem.data.runs, campaign_rig(problem.data)
+    chains = [problem.chain(*each) for each in zip(common, release, runs, strict=True)]
+    simulated: dict[float, list[int]] = {}  # by interval
+    settings = []
+    for i, (run, chain) in enumerate(zip(runs, chains, strict=True)):
+        physics = released_by_spring_end(condensed(chain.physics(), problem.data))
+        steps = report_substeps(physics, run.interval, run.block)
+        duration = (run.reading.size + blocks_beyond(physics, run) + 1) * run.interval
+        settings.append(replace(physics, timestep=run.interval / steps, duration=duration))
+        simulated.setdefault(run.interval, []).append(i)
+    found: dict[int, Array] = {}
+    for interval, places in simulated.items():
+        motions = simulate_motions(rig, [settings[i] for i in places], 1.0 / interval)
+        for i, motion in zip(places, motions, strict=True):
+            found[i] = sample_means(chains[i], motion, runs[i], problem.zero(common[i], release[i]))
+    return [found[i] for i in range(len(runs))]
+
+
+@dataclass(frozen=True, eq=False)
+class Reported:
+    """Residuals from the MuJoCo model, in noise standard deviations of block means, by run id.
+
+    Args:
+        before: of the nominal model fitted to all runs.
+        before_out: of the nominal model, for the runs that could be held out of its fit.
+        after: of the answer's model, held out where possible, else from its fit to all runs.
+        held_out: ids of the runs that could be held out.
+        confirmation: agreement of MuJoCo and the fits' integrator on these.
+        shifts: MuJoCo's block means of the answer's model minus those of the fits' integrator.
+    """
+
+    before: Mapping[str, Array]
+    before_out: Mapping[str, Array]
+    after: Mapping[str, Array]
+    held_out: frozenset[str]
+    confirmation: Confirmation
+    shifts: Mapping[str, Array]
+
+
+def report_fits(nominal: Fit, chosen: Fit, nominal_out: HeldOut, chosen_out: HeldOut) -> Reported:
+    """Predict the reported runs with the MuJoCo model, each fit once.
+
+    Returns:
+        The residuals. Those of the nominal model's held-out runs are from the fits' integrator, corrected by the
+        difference to MuJoCo in the similar fit of all runs.
+    """
+    before = compare(nominal.problem, nominal.point.common, nominal.point.per_run)
+    before_out = {
+        run: nominal_out.residuals[run] - shift
+        for run, shift in zip(before.ids, before.shifts, strict=True)
+        if run in nominal_out.residuals
+    }
+    comparisons = [before]
+    if chosen is nominal:
+        after = dict(zip(before.ids, before.residuals, strict=True)) | before_out
+    else:
+        runs = chosen.problem.data.runs
+        points = [
+            chosen_out.points.get(run.id, (chosen.point.common, chosen.point.per_run[i]))
+            for i, run in enumerate(runs)
+        ]
+        held = compare(chosen.problem, np.array([c for c, _ in points]), np.array([r for _, r in points]))
+        comparisons.append(held)
+        after = dict(zip(held.ids, held.residuals, strict=True))
+    return Reported(
+        before=dict(zip(before.ids, before.residuals, strict=True)),
+        before_out=before_out,
+        after=after,
+        held_out=frozenset(chosen_out.residuals),
+        confirmation=confirm(comparisons, INTEGRATOR_TOLERANCE),
+        shifts=dict(zip(comparisons[-1].ids, comparisons[-1].shifts, strict=True)),
+    )
+
+
+def gap_summary(study: Study, base: Base, shown: Reported) -> GapSummary:
+    """The gap of the campaign and of every run, in noise variances of a sample."""
+    ratio = base.extra + 1.0  # estimated noise over the base
+    random = study.random
+    explained = 0.0 if study.prepared.coarse and COARSE_STEP.name in study.causes else base.extra
+    predicted = {**shown.before, **shown.before_out} if study.causes else shown.before
+    runs, sizes, powers = [], [], []
+    for run in study.nominal.problem.data.runs:
+        before = _excess(predicted[run.id]) / run.block * ratio + base.hum + base.extra
+        after = _excess(shown.after[run.id]) / run.block * ratio + explained
+        if random is not None and run.id in random.process.runs:
+            after = random.process.excess / run.block * ratio + explained
+        held_out = run.id in shown.held_out
+        runs.append(RunGap(run.id, before, after if study.named else before, held_out=held_out))
+        sizes.append(run.reading.size * run.block)
+        powers.append(float(np.var(run.reading)))
+    weight = np.array(sizes) / np.sum(sizes)
+    before = float(weight @ [run.before for run in runs])
+    after = float(weight @ [run.after for run in runs])
+    own = study.similarity.own(1.0, study.similarity.reading)
+    return GapSummary(
+        detected=bool(study.causes),
+        excess_before=before,
+        excess_after=after,
+        closed=share_closed(before, after) if study.named else 0.0,
+        closed_on=ON_RUNS if shown.before_out else FITTED,
+        runs=tuple(runs),
+        false_alarm_rate=study.settings.gap.detection_rate,
+        p_value=0.0 if study.read_off else study.gap.test.p_value,
+        tests=study.gap.test.tests,
+        misfit=Misfit(
+            own * float(np.sqrt(base.variance)),
+            own * float(np.sqrt(weight @ powers)),
+            study.similarity.reading,
+        ),
+    )
+
+
+def held_out_totals(gap: GapSummary, held_out: Waterfall) -> GapSummary:
+    """The summary with the totals of the waterfall, so that all figures and sentences state the same gap.
+
+    Unchanged where nothing is found.
+    """
+    if not gap.detected:
+        return gap
+    before, after = held_out.steps[0].excess, held_out.steps[-1].excess
+    named = len(held_out.steps) > 1
+    return replace(
+        gap,
+        excess_before=before,
+        excess_after=after,
+        closed=share_closed(before, after) if named else 0.0,
+        closed_on=held_out.held_out,
+    )
+
+
+def _excess(residual: Array) -> float:
+    return float(np.mean(residual**2)) - 1.0

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from diagnosis.answer.held_out import Waterfall
-from diagnosis.findings.finding import Picture
-from diagnosis.findings.judged import Judged
+from diagnosis.findings.finding import Judged, Picture
 from diagnosis.findings.misfit import Misfit
 from diagnosis.findings.terms import answer_name
 from diagnosis.where.maps import Maps

@@ -8,9 +8,8 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from diagnosis.findings.finding import Picture, Pictured
+from diagnosis.findings.finding import Judged, Picture, Pictured
 from diagnosis.findings.hidden import Hidden
-from diagnosis.findings.judged import Judged
 from diagnosis.search.weigh import UNKNOWN
 from identification.printing import COEFFICIENTS, coefficient_label
 from identification.show.blocks import TextTable

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from diagnosis.findings.next_step import NextStep
+from diagnosis.findings.finding import NextStep
 from diagnosis.search.disturbance import Disturbance
 
 

@@ -1,4 +1,4 @@
-"""A finding: its numbers, its words and tables, and its figures, in one file.
+"""The types of a finding: its numbers, its words and tables, its figures and next steps, and the judgement.
 
 A finding is a frozen dataclass of typed fields with units, which are also its JSON. `Findings` has a field for it;
 that line is all that the document, its schema, the terminal, the report, the bench and notebooks need of it.
@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import TYPE_CHECKING, ClassVar, Protocol, Self
 
-from diagnosis.findings.judged import Judged
+from diagnosis.findings.misfit import Misfit
 from diagnosis.search.study import Study
+from diagnosis.settings import Settings
 from identification.show.blocks import Figure, Section
 from identification.show.quantity import Quantity
+from identification.status import Remark
 from tunnel_sim.vocabulary.campaign import Campaign
 
 if TYPE_CHECKING:
@@ -86,3 +88,85 @@ class Finding(Pictured):
         """Its figures."""
         del judged
         return ()
+
+
+class Judged(Protocol):
+    """The judgement of a diagnosis in plain values: all that the words of a finding know beside its own fields."""
+
+    @property
+    def campaign(self) -> str:
+        """The name of the campaign."""
+
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """Effect names, sorted; ``unknown``, or none."""
+
+    @property
+    def names_effects(self) -> bool:
+        """Whether the answer names effects."""
+
+    @property
+    def settings(self) -> Settings:
+        """The settings with which the diagnosis was made."""
+
+    @property
+    def decided(self) -> bool:
+        """Whether the answer is decided."""
+
+    @property
+    def likely(self) -> float:
+        """Probability of the likeliest answer, a fraction."""
+
+    @property
+    def misfit(self) -> Misfit:
+        """The conversion from an excess to a misfit."""
+
+    @property
+    def windy(self) -> bool:
+        """Whether any run had wind; True for an answer without the data of its figures."""
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """Remarks of the examination."""
+
+    @property
+    def between_runs_remain(self) -> bool:
+        """Whether differences between the runs could explain what remains."""
+
+    @property
+    def coefficients_after(self) -> Mapping[str, Quantity]:
+        """The coefficients with the causes, by name."""
+
+    @property
+    def set_out(self) -> str:
+        """The name of the answer whose parameters are stated, such as ``most probable answer``."""
+
+    @property
+    def cycling(self) -> bool:
+        """Whether every run is in a limit cycle."""
+
+    @property
+    def rest_is_significant(self) -> bool:
+        """Whether a gap remains beyond chance."""
+
+    @property
+    def rest_is_material(self) -> bool:
+        """Whether it may move a coefficient."""
+
+
+@dataclass(frozen=True)
+class NextStep:
+    """A step for the rig.
+
+    Args:
+        what: to do, a sentence without its full stop.
+        gain: what it buys, a clause such as ``removes 98 % of the gap``; empty where the step says so itself.
+    """
+
+    what: str
+    gain: str = ""
+
+    @property
+    def words(self) -> str:
+        """The step with its gain, a sentence."""
+        return f"{self.what}{f': {self.gain}' if self.gain else ''}."

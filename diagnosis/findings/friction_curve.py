@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.findings.finding import Picture, Pictured
-from diagnosis.findings.judged import Judged
+from diagnosis.findings.finding import Judged, Picture, Pictured
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.model.similarity import Similarity
 from identification.show.drawing import AFTER, INK, NARROW, PAPER

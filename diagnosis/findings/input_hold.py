@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.findings.next_step import NextStep
+from diagnosis.findings.finding import NextStep
 from diagnosis.likelihood.least_squares import try_fit
 from diagnosis.model.parameters import Point
 from diagnosis.search.study import Study

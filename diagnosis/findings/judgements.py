@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 from scipy.special import chdtrc
 
+from diagnosis.findings.closing import INTEGRATOR_TOLERANCE
 from diagnosis.findings.closure import Confirmation, RunGap
-from diagnosis.findings.reported import INTEGRATOR_TOLERANCE
 from diagnosis.findings.terms import MISFITS
 from diagnosis.likelihood.residuals import CHANNELS, misfit
 from diagnosis.model.fact import Fact

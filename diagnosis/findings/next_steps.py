@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 from diagnosis.findings.disturbed_runs import disturbed_step
+from diagnosis.findings.finding import NextStep
 from diagnosis.findings.input_hold import hold_steps
 from diagnosis.findings.next_run import OTHER_INPUT, NextRun, source_of_width
-from diagnosis.findings.next_step import NextStep
 from diagnosis.findings.patch import model_steps
 from diagnosis.findings.repeatability import width_text
 from diagnosis.findings.spring_choices import choice_steps

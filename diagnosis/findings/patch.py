@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from diagnosis.findings.judged import Judged
-from diagnosis.findings.next_step import NextStep
+from diagnosis.findings.finding import Judged, NextStep
 from diagnosis.patch.written_model import PatchedModel
 from identification.show.blocks import TextTable
 from identification.show.numbers import listed, reading_shown, significant, unit_mark, with_std

@@ -7,8 +7,7 @@ from functools import partial
 from math import degrees
 from typing import Any, Final
 
-from diagnosis.findings.finding import Picture
-from diagnosis.findings.judged import Judged
+from diagnosis.findings.finding import Judged, Picture
 from diagnosis.findings.place_figures import (
     backbone_figure,
     moment_figure,

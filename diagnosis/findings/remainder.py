@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from scipy.special import chdtrc
 
-from diagnosis.findings.finding import Picture
+from diagnosis.findings.finding import Judged, Picture
 from diagnosis.findings.hidden import Hidden
-from diagnosis.findings.judged import Judged
 from diagnosis.findings.judgements import Estimates
 from diagnosis.findings.terms import KINDS, scattering
 from diagnosis.likelihood.ceiling import Ceiling

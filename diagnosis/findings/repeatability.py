@@ -10,9 +10,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from diagnosis.answer.run_deviations import RunDeviations, RunRepeat, ScatterLimits, Spread, Trend
-from diagnosis.findings.finding import Picture, Pictured
-from diagnosis.findings.judged import Judged
-from diagnosis.findings.next_step import NextStep
+from diagnosis.findings.finding import Judged, NextStep, Picture, Pictured
 from diagnosis.findings.terms import NUMBERS, SCATTERS, scattering, without_scatter
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.search.weigh import UNKNOWN

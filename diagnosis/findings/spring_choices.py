@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from diagnosis.findings.next_step import NextStep
+from diagnosis.findings.finding import NextStep
 from diagnosis.search.rivals.two_springs import ONE_SPRING, SpringError, spring_error
 from diagnosis.search.study import Study
 from identification.show.numbers import for_people, listed, plain, probability

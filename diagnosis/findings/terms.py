@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from diagnosis.findings.judged import Judged
+from diagnosis.findings.finding import Judged
 from identification.show.numbers import plain
 from tunnel_sim.effects import BetweenRuns
 from tunnel_sim.effects.registry import ALL_EFFECTS, known_effects

@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, ClassVar
 
-from diagnosis.findings.finding import Answered, Finding, Picture
-from diagnosis.findings.judged import Judged
+from diagnosis.findings.finding import Answered, Finding, Judged, Picture
 from identification.show.blocks import Paragraph, Section, TextTable
 from identification.show.drawing import AFTER, BEFORE, NARROW
 from identification.show.numbers import estimated, listed, relative_change, size_change, with_std

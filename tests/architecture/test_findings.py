@@ -6,8 +6,8 @@ import ast
 
 from tests.support.sources import ROOT, parsed
 
-COMPOSITIONS = {"cards", "head", "next_steps", "schema", "sections", "verdict", "written"}
-"""They join several findings: the verdict, the head, next steps, cards, sections, text fields and the schema."""
+COMPOSITIONS = {"cards", "head", "next_steps", "schema", "sections", "verdict"}
+"""They join several findings: the verdict, the head, next steps, cards, sections and the schema."""
 FINDINGS = ROOT / "diagnosis" / "findings"
 
 

@@ -15,7 +15,6 @@ from diagnosis.findings.misfit import Misfit
 from diagnosis.findings.place import REASONS, reason
 from diagnosis.findings.terms import KINDS
 from diagnosis.findings.whole import Found
-from diagnosis.findings.written import sentences
 from diagnosis.model.fact import Fact, Noted
 from diagnosis.result import Diagnosis
 from diagnosis.settings import Settings
@@ -288,16 +287,17 @@ def test_what_could_be_closed(given: Document) -> None:
 
 
 def test_all_text_fields_are_written_from_the_facts(given: Document) -> None:
-    found = sentences(findings_of(given))
+    found = findings_of(given).in_words()
     assert found.verdict.startswith(
         "The gap is explained by either quadratic damping (91 %) or coulomb friction"
     )
-    assert found.rest in found.verdict
-    assert found.where == where_words(findings_of(given))
-    assert found.noise == "the campaign states no noise"
+    assert found.rest is not None
+    assert found.rest.words in found.verdict
+    assert found.where.words == where_words(findings_of(given))
+    assert found.noise.reason == "the campaign states no noise"
     assert [text.partition(":")[0] for text in found.cautions] == ["There are 2 runs only"]
-    assert found.remarks[0].what.startswith("sampled too slowly")
-    assert (found.closable, found.patch) == ("", ())
+    assert found.remarks[-1].what.startswith("sampled too slowly")
+    assert (found.closable, found.model) == (None, None)
     assert CAUSE.replace("_", " ") in found.verdict
 
 

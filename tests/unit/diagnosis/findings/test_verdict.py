@@ -9,13 +9,13 @@ import pytest
 
 from diagnosis.answer.held_out import ON_RUNS, Step, Waterfall
 from diagnosis.findings.candidates import Candidate
+from diagnosis.findings.closing import held_out_totals
 from diagnosis.findings.closure import FITTED, GapSummary, RunGap
 from diagnosis.findings.decision import Predictions, decision
 from diagnosis.findings.head import Head
 from diagnosis.findings.judgements import Nearly, immaterial, nearly
 from diagnosis.findings.misfit import Misfit
 from diagnosis.findings.next_steps import next_steps, rival_lines
-from diagnosis.findings.reported import held_out_totals
 from diagnosis.findings.sections import diagnosis_brief
 from diagnosis.findings.verdict import headline, undecided_words, verdict
 from diagnosis.likelihood.least_squares import fit

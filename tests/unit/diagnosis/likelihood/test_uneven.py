@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.findings.reported import compare
+from diagnosis.findings.closing import compare
 from diagnosis.likelihood.least_squares import fit, scaled_residuals
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import nominal_start
