@@ -4,30 +4,38 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.examination.slips.angle_unit import AngleInDegrees
 from identification.examination.slips.base import RecordSlip, SlipEvidence, StatementSlip
-from identification.examination.slips.clock import DriftingClock
-from identification.examination.slips.coupling import CoupledSensor
-from identification.examination.slips.equal_statements import EqualStatementsDiffer
 from identification.examination.slips.factors import WrongFactor
-from identification.examination.slips.mirrored import MirroredRun, ReleaseOnTheOtherSide
-from identification.examination.slips.odd_gain import OddGain
-from identification.examination.slips.odd_noise import OddNoise
-from identification.examination.slips.resolution import ResolutionTooCoarse
-from identification.examination.slips.run_comparisons import (
+from identification.examination.slips.instruments import CoupledSensor, DriftingClock
+from identification.examination.slips.odd_sensors import (
+    AngleInDegrees,
+    MirroredRun,
+    OddGain,
+    OddNoise,
+    ReleaseOnTheOtherSide,
+)
+from identification.examination.slips.run_labels import WrongLabel, WrongLabels
+from identification.examination.slips.spoilt_records import (
+    ClockJumps,
+    ConstantTail,
+    RepeatedRecord,
+    ResolutionTooCoarse,
+    StandingForMissing,
+    StuckReading,
+    WrappedAngle,
+)
+from identification.examination.slips.statements import (
+    EqualStatementsDiffer,
     InertiaOffTheSprings,
+    InertiaOfNoBody,
     LabelsExchanged,
     MotionGrows,
     SpringOffTheLine,
     SpringsRenumbered,
+    WindExchanged,
+    WindNotSeen,
+    YawMomentTooLarge,
 )
-from identification.examination.slips.run_labels import WrongLabel, WrongLabels
-from identification.examination.slips.spoilt import ClockJumps, StandingForMissing
-from identification.examination.slips.still_air import WindExchanged, WindNotSeen
-from identification.examination.slips.tails import ConstantTail, StuckReading
-from identification.examination.slips.twins import RepeatedRecord
-from identification.examination.slips.units_of_all import InertiaOfNoBody, YawMomentTooLarge
-from identification.examination.slips.wraps import WrappedAngle
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from identification.examination.examine import examine
-from identification.examination.slips.odd_gain import odd_gains
+from identification.examination.slips.odd_sensors import odd_gains
 from tests.support.slip_cases import RELEASED
 from tests.support.slip_rig import clocking, reading, scaling, sensing
 from tunnel_sim.vocabulary.campaign import Campaign

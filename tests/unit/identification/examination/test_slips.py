@@ -13,7 +13,7 @@ from diagnosis import diagnose
 from identification import identify
 from identification.estimate import PARAMETERS
 from identification.examination.examine import examine
-from identification.examination.slips.spoilt import ClockJumps
+from identification.examination.slips.spoilt_records import ClockJumps
 from identification.status import Outcome, Status
 from tests.marks import slow
 from tests.support.slip_cases import FURTHER, PLAIN, SIX, TABLE, Case
