@@ -19,6 +19,7 @@ import typer
 from tunnel_lab.commands import (
     about,
     blind,
+    compare,
     demo,
     diagnose,
     effects,
@@ -109,7 +110,7 @@ GROUPS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
         "sweep": sweep.sweep,
         "train": train.train,
     },
-    "Results": {"compare": diagnose.compare, "paper": paper.paper},
+    "Results": {"compare": compare.compare, "paper": paper.paper},
     "Developers": {
         "doctor": about.doctor,
         "docs": about.docs,

@@ -1,8 +1,7 @@
-"""``tunnel diagnose`` and ``compare``: the misfit of the nominal model, and the effects that explain it."""
+"""``tunnel diagnose``: the misfit of the nominal model, and the effects that explain it."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -13,9 +12,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from typer import Argument, Option
 
-from identification.printing import coefficient_label
-from identification.show.blocks import TextTable
-from identification.show.numbers import estimated, in_stds, unit_mark, with_std
 from tunnel_lab.terminal.arguments import HELP as CAMPAIGN_HELP
 from tunnel_lab.terminal.arguments import (
     EffectsFileOption,
@@ -29,8 +25,7 @@ from tunnel_lab.terminal.arguments import (
 from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.outputs import say, say_written, show
 from tunnel_lab.terminal.progress import step_display
-from tunnel_sim.vocabulary.dimensions import beside
-from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
+from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
     from diagnosis.result import Diagnosis
@@ -38,7 +33,6 @@ if TYPE_CHECKING:
     from tunnel_sim.engine.joint_model import JointModel
     from tunnel_sim.vocabulary.campaign import Campaign
 
-_NONE = "–"
 _output = partial(Option, rich_help_panel="Output")
 _written = partial(output_file, panel="Output")
 _causes = partial(Option, rich_help_panel="Effects")
@@ -303,107 +297,3 @@ def write_patch(answer: Diagnosis, path: Path, *, native: bool = False) -> None:
         notes = zip(answer.model.notes, answer.model.differences, strict=True)
         say(next(f"Note: {note}" for note, fact in notes if fact.kind == "by plugin"), stderr=True)
     (answer.model if nearest is None or not native else nearest).write(path)
-
-
-def compare(
-    documents: Annotated[
-        tuple[Path, ...], Argument(metavar="DIAGNOSIS.json", help="Written by tunnel diagnose --json.")
-    ],
-) -> None:
-    """Compare diagnoses, such as before and after a repair of the rig.
-
-    For each diagnosis: the gap (its power over that of the noise) without and with
-    the causes, the causes with their parameters, and the coefficients with standard
-    deviations. The last table shows the difference of each coefficient from the
-    first diagnosis; it assumes that the campaigns are independent.
-
-    [bold]Examples[/bold]
-      tunnel compare before.json after.json
-      tunnel compare may.json june.json july.json --format csv
-
-    [bold]Exit status[/bold]
-      0 compared, 2 bad input.
-    """
-    from tunnel_lab.report.diagnosis_file import read_diagnosis
-
-    if len(documents) < 2:
-        raise TunnelError("only one diagnosis", where=shown(documents[0]), remedy="name two files or more")
-    diagnoses = [read_diagnosis(path) for path in documents]
-    # The campaign's name; the file's where campaigns share a name; if also shared, with a number.
-    names, stems = [d.campaign for d in diagnoses], [one_line(path.stem) for path in documents]
-    if len(set(names)) < len(names):
-        names = stems
-    if len(set(names)) < len(names):
-        names = [f"{place}: {stem}" for place, stem in enumerate(stems, 1)]
-    show(comparison_tables(names, diagnoses))
-
-
-def comparison_tables(names: Sequence[str], answers: Sequence[Diagnosis]) -> list[TextTable]:
-    """All tables of a comparison: gap and answer, parameters, coefficients, and their differences from the first.
-
-    Args:
-        names: of the diagnoses, each different.
-        answers: the reference first.
-    """
-    from identification.show.numbers import probability, share
-
-    def excess(answer: Diagnosis, value: float) -> str:
-        """An excess with its standard deviation by chance, where the diagnosis has the noise of its runs."""
-        maps = answer.maps
-        return f"{value:.4g}" if maps is None else with_std(value, maps.excess_std)
-
-    rows_of_answers = (
-        ("gap [× noise variance]", *(excess(d, d.gap.excess_before) for d in answers)),
-        (
-            "residual gap [× noise variance]",
-            *(excess(d, d.gap.excess_after) if d.names_effects else _NONE for d in answers),
-        ),
-        ("share explained", *(share(d.gap.closed) if d.names_effects else _NONE for d in answers)),
-        ("causes", *(",\n".join(d.causes) or "none" for d in answers)),
-        ("decided", *("yes" if d.decision.decided else "no" for d in answers)),
-        ("or instead", *(",\n".join(d.ambiguous_with) or _NONE for d in answers)),
-        ("probability", *(probability(d.candidates[0].probability) for d in answers)),
-    )
-    parameters = []  # of each answer, by effect and name
-    for answer in answers:
-        first_answer, texts = answer.candidates[0], {}
-        for full, given in first_answer.parameters.items():
-            owner, _, name = full.rpartition(".")
-            mark = unit_mark(beside(given.unit, ""))
-            owner = owner or first_answer.effect
-            texts[owner, name] = answer.repeated.spread_estimate(owner, given) or estimated(given, mark)
-        parameters.append(texts)
-    labels = {
-        name: coefficient_label(name, given.unit)
-        for answer in answers
-        for name, given in answer.coefficients.after.items()
-    }
-    coefficients = []
-    for name, label in labels.items():
-        for key in ("before", "after"):
-            found = [getattr(answer.coefficients, key).get(name) for answer in answers]
-            cells = (_NONE if given is None else estimated(given) for given in found)
-            coefficients.append((f"{label} {key}", *cells))
-    first, *others = (answer.coefficients.after for answer in answers)
-    differences = []  # assumed independent
-    for name, label in labels.items():
-        row, mine = [label], first.get(name)
-        for theirs in (other.get(name) for other in others):
-            if mine is None or theirs is None or mine.unit != theirs.unit:
-                row.append(_NONE)
-            elif mine.std is not None and theirs.std is not None:
-                moved, std = theirs.value - mine.value, math.hypot(mine.std, theirs.std)
-                row.append(f"{with_std(moved, std)} ({in_stds(moved, std)})")
-            else:
-                row.append(_NONE)
-        differences.append(tuple(row))
-    keys = dict.fromkeys(key for texts in parameters for key in texts)
-    rows = tuple((*key, *(texts.get(key, _NONE) for texts in parameters)) for key in keys)
-    quantity, parameter = ("quantity",), ("effect", "parameter")
-    change = f"Coefficients with the causes: difference from {names[0]}"
-    return [
-        TextTable("Gap and answer", (*quantity, *names), rows_of_answers),
-        TextTable("Parameters ± one standard deviation", (*parameter, *names), rows),
-        TextTable("Coefficients ± one standard deviation", (*quantity, *names), tuple(coefficients)),
-        TextTable(change, (*quantity, *names[1:]), tuple(differences)),
-    ]

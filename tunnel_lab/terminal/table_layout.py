@@ -29,7 +29,10 @@ _NUMBER = re.compile(r"[+-]?\d+(\.\d+)?(e[+-]?\d+)?")
 
 
 def rendered(table: TextTable, kind: TableFormat) -> str:
-    """A table of texts as CSV, Markdown or JSON with a final line feed; numeric cells become numbers in JSON."""
+    """A table of texts as CSV, Markdown or JSON with a final line feed.
+
+    In JSON numeric cells become numbers, and empty ones in columns of numbers null.
+    """
     if kind is TableFormat.MD:
         return as_markdown([table])
     title = _on_one_line(table.title)
@@ -37,19 +40,20 @@ def rendered(table: TextTable, kind: TableFormat) -> str:
     if kind is TableFormat.JSON:
         from tunnel_sim.files.writing import json_line
 
-        records = [
-            {
-                head: cell if not _NUMBER.fullmatch(cell) else int(cell) if cell.isdecimal() else float(cell)
-                for head, cell in zip(heads, row, strict=True)
-            }
-            for row in rows
-        ]
+        numeric = [heading in table.right for heading in table.columns]
+        records = [dict(zip(heads, map(_json_value, row, numeric), strict=True)) for row in rows]
         return printable_json(json_line({"table": title, "rows": records})) + "\n"
     stream = io.StringIO()
     stream.write(f"# {title}\n")
     texts = ([as_text_cell(cell) for cell in line] for line in (heads, *rows))
     csv.writer(stream, lineterminator="\n").writerows(texts)
     return stream.getvalue()
+
+
+def _json_value(cell: str, numeric: bool) -> str | float | None:
+    if not _NUMBER.fullmatch(cell):
+        return None if numeric and not cell else cell
+    return int(cell) if cell.isdecimal() else float(cell)
 
 
 def _on_one_line(text: str) -> str:
