@@ -34,6 +34,8 @@ _STILL_GROWING = 1.1  # times the previous swing: the hand has not let go
 _LEAST_HALVES = 6  # half cycles: a shorter motion is not a run
 _VISIBLE = 2.0  # times the least swing: noise alone does not reach it
 _ROUGH = 0.25  # median second difference of the logarithms of swings: a free decay is smoother
+_EVEN = 0.05  # the same, of a decay that random motion does not imitate
+_ODD = 8.0  # times the median of swings at random: none is larger
 _AT_TURN = 0.005  # of an excursion: the reading stays as near the turning point while the body is held
 _HELD = 0.5  # of a half cycle: a free turning point is not that flat for longer
 _FALLING = 0.75  # share of swings smaller than the one before: half of them at random
@@ -210,6 +212,9 @@ def _release_at(swings: Swings, k: int, since: int) -> int | None:
         return None
     if rested or (paused and size[at] > _GROWN * earlier):
         return at
+    long = k > since and bool(swings.slow[k - 1] or swings.lasts[k - 1] > _LONGER * usual[k - 1])
+    if long and at == k and _is_even(size[max(since, k - _BEFORE) : k - 1]):
+        return at
     after = size[at + 1 : at + 3]
     tapped = k > since and size[k] > _GROWN * swings.sampled * latest and size[at] > _TAPPED * earlier
     return at if tapped and after.size == 2 and after.min() > size[at] / _TAPPED else None
@@ -221,7 +226,12 @@ def _random_before(swings: Swings, k: int) -> float:
     sizes = swings.size[part][~swings.slow[part]]
     if sizes.size < _LEAST_HALVES or _bend(sizes) <= _ROUGH or np.mean(np.diff(sizes) < 0.0) >= _FALLING:
         return 0.0
-    return float(sizes.max())
+    return float(min(sizes.max(), _ODD * np.median(sizes)))  # a single larger one is a pull
+
+
+def _is_even(sizes: PerSample) -> bool:
+    """Whether swings decay so evenly that a single slow one is a pull, however short."""
+    return sizes.size >= _LEAST_HALVES and _bend(sizes) <= _EVEN and np.mean(np.diff(sizes) < 0.0) >= _FALLING
 
 
 def _bend(sizes: PerSample) -> float:

@@ -37,6 +37,12 @@ def pulled_from_motion(log: Log, u: float) -> Log:
     return log.pull(0.35, 2 * u).hold(1.5 * u).swing(0.35, 25 * u)
 
 
+def pulled_briefly(log: Log, u: float) -> Log:
+    log.pull(0.35, 3 * u).hold(1.2 * u).swing(0.35, 15.3 * u)
+    log.pull(0.3, 1.4 * u).hold(0.8 * u).swing(0.3, 15.3 * u)
+    return log.pull(0.3, 1.4 * u).swing(0.3, 15.3 * u)
+
+
 def faded(log: Log) -> float:
     return min(200.0, 4.6 / (2.0 * np.pi * log.zeta)) / log.frequency
 
@@ -76,6 +82,7 @@ SESSIONS = (
     hand,
     two_releases,
     pulled_from_motion,
+    pulled_briefly,
     much_smaller,
     small_first,
     knocked,
@@ -176,7 +183,7 @@ def test_random_motion_is_one_record_and_no_run_begins_in_it(zeta: float) -> Non
     assert cut <= 1
 
 
-@pytest.mark.parametrize("seed", [27, 37, 45, 50, 54, 58, 59])
+@pytest.mark.parametrize("seed", [27, 29, 37, 45, 50, 54, 58, 59, 90])
 def test_a_pull_to_the_next_hold_between_two_samples_loses_no_release(seed: int) -> None:
     """A logger that pauses while the hand moves the body; the pull looks like a swing of half its size."""
     rng, rate, step = np.random.default_rng([9, seed]), 500.0, np.deg2rad(0.01)
