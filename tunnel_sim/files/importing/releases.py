@@ -231,7 +231,8 @@ def _random_before(swings: Swings, k: int) -> float:
 
 def _is_even(sizes: PerSample) -> bool:
     """Whether swings decay so evenly that a single slow one is a pull, however short."""
-    return sizes.size >= _LEAST_HALVES and _bend(sizes) <= _EVEN and np.mean(np.diff(sizes) < 0.0) >= _FALLING
+    falling = float(np.mean(np.diff(sizes) < 0.0)) if sizes.size > 1 else 0.0
+    return sizes.size >= _LEAST_HALVES and _bend(sizes) <= _EVEN and falling >= _FALLING
 
 
 def _bend(sizes: PerSample) -> float:
