@@ -279,6 +279,11 @@ with the other known, the customary sign of collinearity in regression (a varian
 LEAST_WIDTH_FREEDOM = 1.0
 """Least degrees of freedom of a variance with estimated widths: two runs show one difference."""
 
+REPEATING = 2.0
+"""Standard deviations below the usual width, from which all narrower widths between runs are equally probable. Some
+rigs, simulated ones among them, repeat exactly. Judgement: the density there is e⁻² of the greatest, which makes it
+about one rig in six."""
+
 LEAST_CHANGE = 0.02
 """Relevant change of a bias or a spread, over the spread, where both trials use the same records."""
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.policy import REPEATING
 from tunnel_sim.vocabulary.between_runs import USUAL_SCATTER
 from tunnel_sim.vocabulary.record import Array
 
@@ -150,7 +151,10 @@ def marginal(runs: RunProducts, widths: Array) -> Marginal:
 
 @dataclass(frozen=True, eq=False)
 class WidthPrior:
-    """Prior of the widths: ln(width) is normal, within bounds.
+    """Prior of the widths: ln(width) is normal within bounds, and a width may be far below the usual one.
+
+    Some rigs, simulated ones among them, repeat exactly. From `REPEATING` standard deviations below the median down
+    to the least width, the density is constant.
 
     Args:
         usual: medians, shape (k,).
@@ -170,7 +174,9 @@ class WidthPrior:
 
     def slope(self, widths: Array) -> Array:
         """Derivative of `cost` with respect to ln(widths), shape (k,)."""
-        return np.asarray(2.0 * self._away(widths) / np.maximum(self._spread, 1e-9), np.float64)
+        away = self._away(widths)
+        falls = np.where(away > -REPEATING, away, 0.0)
+        return np.asarray(2.0 * falls / np.maximum(self._spread, 1e-9), np.float64)
 
     @property
     def free(self) -> np.ndarray:
@@ -183,7 +189,7 @@ class WidthPrior:
 
     def _away(self, widths: Array) -> Array:
         away = np.log(widths / self.usual) / np.where(self.free, self._spread, 1.0)
-        return np.where(self.free, away, 0.0)
+        return np.where(self.free, np.maximum(away, -REPEATING), 0.0)
 
 
 def likeliest_widths(runs: RunProducts, prior: WidthPrior, start: Array | None = None) -> Array:

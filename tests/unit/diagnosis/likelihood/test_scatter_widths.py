@@ -51,6 +51,21 @@ def test_runs_that_repeat_better_cost_less() -> None:
     assert cost(rough, known) - cost(close, known) > 2.0 * (RUNS - 1) * np.log(4.0)
 
 
+def test_few_runs_that_repeat_exactly_have_no_width() -> None:
+    """Three runs show deviations of 3e-4 usual widths, and have none; a normal density would keep a tenth of one."""
+    found = columns(3e-4 * WIDTH)
+    few = ScatterColumns(
+        found.bases[:3],
+        found.deviations[:3],
+        found.common[:3],
+        [
+            0.1 * (z - d[:, 0] * (d[:, 0] @ z) / (d[:, 0] @ d[:, 0]))
+            for z, d in zip(found.seen, found.deviations)
+        ][:3],
+    )
+    assert few.likeliest(PRIOR).widths[0] < 0.01 * WIDTH
+
+
 @pytest.mark.parametrize(
     ("within", "size", "shown"), [(True, 0.1, True), (False, 0.1, False), (False, 140.0, True)]
 )
