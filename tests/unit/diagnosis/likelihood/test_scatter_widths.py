@@ -52,17 +52,11 @@ def test_runs_that_repeat_better_cost_less() -> None:
 
 
 def test_few_runs_that_repeat_exactly_have_no_width() -> None:
-    """Three runs show deviations of 3e-4 usual widths, and have none; a normal density would keep a tenth of one."""
+    """Each shows a deviation of 3e-4 usual widths, and has none; a normal density would keep a tenth of one."""
     found = columns(3e-4 * WIDTH)
-    few = ScatterColumns(
-        found.bases[:3],
-        found.deviations[:3],
-        found.common[:3],
-        [
-            0.1 * (z - d[:, 0] * (d[:, 0] @ z) / (d[:, 0] @ d[:, 0]))
-            for z, d in zip(found.seen, found.deviations)
-        ][:3],
-    )
+    pairs = list(zip(found.seen, found.deviations, strict=True))[:3]
+    noise = [0.1 * (z - d[:, 0] * (d[:, 0] @ z) / (d[:, 0] @ d[:, 0])) for z, d in pairs]
+    few = ScatterColumns(found.bases[:3], found.deviations[:3], found.common[:3], noise)
     assert few.likeliest(PRIOR).widths[0] < 0.01 * WIDTH
 
 
