@@ -248,7 +248,8 @@ def _is_decay(moving: PerSample, sizes: PerSample, swings: Swings, start: int, *
     """
     first = max(moving[:2]) if start == 0 else moving[0]
     large = sizes > _LITTLE * first
-    regrown = large & (sizes > _GROWN * swings.sampled * np.minimum.accumulate(sizes))
+    smallest = np.minimum.accumulate(sizes)
+    regrown = large & (sizes > np.maximum(_GROWN * swings.sampled * smallest, smallest + swings.least))
     if followed:
         regrown[:-1] &= large[1:]
         regrown[-1] = False

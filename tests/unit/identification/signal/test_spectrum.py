@@ -8,7 +8,6 @@ import pytest
 from identification import identify
 from identification.signal.frequency import psd_peak, starting_frequency
 from identification.status import Status
-from tests.marks import slow
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
 
@@ -72,12 +71,12 @@ def test_the_frequency_of_a_decay_is_found_whatever_its_length() -> None:
     assert misses(60, 2e4, 5e4) == []
 
 
-@slow
+@pytest.mark.slow
 def test_the_frequency_of_a_decay_is_found_at_any_rate_and_length() -> None:
     assert misses(1000, 2e4, 4e5) == []
 
 
-@slow
+@pytest.mark.slow
 @pytest.mark.parametrize("drift", [0.0, 0.09])
 def test_a_decay_of_thousands_of_cycles_is_identified(drift: float) -> None:
     """With a drift of its centre, too, by which neither frequency nor damping changes."""

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.marks import slow
 from tests.support.import_files import written
 from tests.support.logs import Log
 from tunnel_lab.plotting.runs import import_picture
@@ -125,7 +124,7 @@ def test_every_run_of_a_session_is_found_and_nothing_else(session: Callable[[Log
     assert list(faults(session, 1e-4, 0.0, (40,))) == []
 
 
-@slow
+@pytest.mark.slow
 @pytest.mark.parametrize("step", [0.0, 2.0 * np.pi / 16384])
 @pytest.mark.parametrize("session", SESSIONS)
 def test_every_run_is_found_at_any_rate_and_with_a_sensor_of_steps(
