@@ -111,6 +111,11 @@ def _nine(off: float = 0.0, **actual: float) -> Campaign:
     return _stated_round(conditions, off, actual)
 
 
+def _two_of_21() -> Campaign:
+    """Three springs; two of them are 21 N m/rad in two digits."""
+    return honest([Condition(k, v) for k in (20.6, 21.4, 44.84) for v in (0.0, 15.0, 25.0)])
+
+
 def _stated_round(conditions: list[Condition], off: float, actual: dict[str, float]) -> Campaign:
     moved = [
         replace(one, speed=actual.get(f"r{number}", one.speed or off))
@@ -272,6 +277,12 @@ TABLE: dict[str, Case] = {
         SIX, _density_along(0.2), "air_density falling by 17 % from the first run to the last", ("r2", "r6")
     ),
     "one clock 10 % fast": Case(PLAIN, clocking(lambda t: 1.1 * t, "r1"), "time_s of r1 10 % fast", ("r1",)),
+    "two springs rounded to one value": Case(
+        _two_of_21(),
+        _springs(21.0, 21.0, 45.0),
+        "two springs under the rounded value 21 N m/rad, the one in r1, r2, r3 3.7 % softer",
+        ("r1", "r2", "r3"),
+    ),
     "one clock jumps": Case(
         PLAIN, clocking(lambda t: t + 30.0 * (t > 4.0), "r2"), "time_s jumps by 30 s after 4 s", ("r2",)
     ),

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from decimal import Decimal
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,7 @@ _LAGS = (0.1, -0.1)  # radians of phase: first guesses
 _CERTAIN = 1e6  # degrees of freedom of a bound
 _UNITS = {"wind_speed": "m/s", "air_density": "kg/m3", "spring_stiffness": "N m/rad"}
 _ALONG = " along"
+_ROUNDED = "spring_stiffness, rounded"
 _KINDS = {"speed": "wind_speed", "density": "air_density", "clock": "time_s", "spring": "spring_stiffness"}
 
 
@@ -54,7 +56,8 @@ class WrongFactor(StatementSlip):
             return ()
         motions = MeasuredMotions.of(swings)
         found = _agreeing(motions)
-        if not found or _labels_agree(seen, motions, found[0]):
+        best = min(found, key=lambda one: one.fit.squares(one.level), default=None)
+        if best is None or _labels_agree(seen, motions, best):
             return ()
         return _said(motions, found)
 
@@ -92,8 +95,33 @@ def _agreeing(m: MeasuredMotions) -> list[_Found]:
             level = min(one.level for one in found)
             limit = min(one.fit.squares(level) for one in found) + float(chdtri(1, policy.DIFFERENCE_RATE))
             ties = [one for one in found if one.fit.squares(level) <= limit]
-            return sorted(ties, key=lambda one: one.fit.squares(level))
+            ties.sort(key=lambda one: one.fit.squares(level))
+            return [*_rounded(m, ties, level, limit, wide=wide), *ties]
     return []
+
+
+def _rounded(
+    m: MeasuredMotions, ties: Sequence[_Found], level: float, limit: float, *, wide: bool
+) -> Iterator[_Found]:
+    """Two springs that one rounded value states, where they agree as well as a wrong clock.
+
+    Args:
+        limit: of the sum of squares at the level of scatter.
+    """
+    parts: dict[Places, float] = {}
+    for one in ties:
+        for value in np.unique(m.stated) if one.trial.kind == "time_s" else ():
+            own = np.flatnonzero(m.stated == value).tolist()
+            inside = [place in one.trial.places for place in own]
+            if any(inside) and not all(inside):
+                part = tuple(p for p, same in zip(own, inside, strict=True) if same == inside[0])
+                parts.setdefault(part, float(value))
+    for part, value in parts.items():
+        trial = TrialSlip(_scaled("spring", part), part, _ROUNDED)
+        fit = fitted(m, trial, wide=wide)
+        step = float(Decimal(1).scaleb(int(Decimal(f"{value:.15g}").as_tuple().exponent)))
+        if abs(fit.number) <= step / value and fit.squares(level) <= limit:
+            yield _Found(trial, fit, level, ties[0].refused)
 
 
 def _judged(trial: TrialSlip, fit: ConditionsFit, effects: Sequence[ConditionsFit]) -> _Found | None:
@@ -224,9 +252,8 @@ def _said(m: MeasuredMotions, found: Sequence[_Found]) -> tuple[Remark, ...]:
     ids = tuple(dict.fromkeys(m.swings[place].run.id for one in shown for place in one.trial.places))
     said = ", or with ".join(_words(m, one.trial, one.fit.number) for one in shown)
     what = f"the stated values contradict frequency and damping of the runs, which agree with {said}"
-    keys = dict.fromkeys(
-        "wind_speed" if one.trial.kind == "idle" else one.trial.kind.removesuffix(_ALONG) for one in shown
-    )
+    names = {"idle": "wind_speed", _ROUNDED: "spring_stiffness (with one more digit)"}
+    keys = dict.fromkeys(names.get(one.trial.kind, one.trial.kind.removesuffix(_ALONG)) for one in shown)
     remedy = f"correct {' or '.join(keys)}, or leave {'the run' if len(ids) == 1 else 'these runs'} out"
     outcome = Outcome.REFUSED if found[0].refused else Outcome.NOTED
     figures: dict[str, Any] = {SYSTEMATIC: said}
@@ -239,6 +266,10 @@ def _words(m: MeasuredMotions, trial: TrialSlip, number: float) -> str:
     percent = f"{100.0 * abs(number):.2g} %"
     if trial.kind == "time_s":
         return f"time_s of {ids} {percent} {'fast' if number > 0.0 else 'slow'}"
+    if trial.kind == _ROUNDED:
+        goes = "stiffer" if number > 0.0 else "softer"
+        value = f"{m.stated[trial.places[0]]:.4g} N m/rad"
+        return f"two springs under the rounded value {value}, the one in {ids} {percent} {goes}"
     if trial.kind == "idle":
         unit = float(m.conditions.speed[m.conditions.speed > 0.0].min())
         return f"a wind of {abs(number) * unit:.2g} m/s in {ids}, which state none"
