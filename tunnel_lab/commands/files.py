@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
@@ -28,6 +29,20 @@ _unit = partial(Option, rich_help_panel="Units")
 _runs = partial(Option, rich_help_panel="Runs")
 _condition = partial(Option, rich_help_panel="Conditions")
 _output = partial(Option, rich_help_panel="Output")
+
+
+def _number(option: str) -> Callable[[str], float]:
+    """A parser of an option's number, which may have a decimal comma."""
+
+    def parsed(text: str) -> float:
+        from tunnel_sim.files.importing.choices import option_number
+
+        try:
+            return option_number(text, option)
+        except ValueError:
+            raise TunnelError(f"'{text}' is not a number", where=option, remedy="give a number") from None
+
+    return parsed
 
 
 @dataclass(frozen=True)
@@ -60,9 +75,20 @@ class StatedChoices:
         str | None, _column("--time", metavar="NAME", help="Column of the times, by name or number.")
     ] = None
     time_unit: Annotated[str | None, _unit("--time-unit", help="Unit of the times: s, ms, us, min, …")] = None
-    rate: Annotated[float | None, _unit("--rate", help="Sample rate, Hz, where there are no times.")] = None
+    rate: Annotated[
+        float | None,
+        _unit(
+            "--rate", parser=_number("--rate"), metavar="HZ", help="Sample rate, where there are no times."
+        ),
+    ] = None
     counts_per_turn: Annotated[
-        float | None, _unit("--counts-per-turn", help="Counts of an encoder per turn.")
+        float | None,
+        _unit(
+            "--counts-per-turn",
+            parser=_number("--counts-per-turn"),
+            metavar="NUMBER",
+            help="Counts of an encoder per turn.",
+        ),
     ] = None
     calibration: Annotated[
         str | None,
@@ -104,7 +130,13 @@ class StatedChoices:
         _runs("--end", metavar="[RUN=]S", help="Last time of all files, or of one run, s. May be repeated."),
     ] = ()
     rest: Annotated[
-        float | None, _condition("--rest", help="Reading at rest of every run, rad: it is subtracted.")
+        float | None,
+        _condition(
+            "--rest",
+            parser=_number("--rest"),
+            metavar="RAD",
+            help="Reading at rest of every run: it is subtracted.",
+        ),
     ] = None
     leave_out: LeaveOutOption = ()
     cut: Annotated[

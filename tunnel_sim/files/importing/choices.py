@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -12,6 +13,7 @@ from pydantic import Field
 from tunnel_sim.files.campaign_folder import IMPORT_RECIPE
 from tunnel_sim.files.importing.condition_names import Conditions, in_si, units_of
 from tunnel_sim.files.importing.units import known_unit
+from tunnel_sim.files.plausible import plausible_values
 from tunnel_sim.files.toml_input import (
     OneLine,
     Positive,
@@ -133,7 +135,49 @@ def read_recipe(path: Path) -> ImportChoices:
     return read_document(Recipe, path, missing=missing).choices
 
 
-_WITH_UNIT = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*)")
+_DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
+_OF_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
+_WITH_UNIT = re.compile(r"([+-]?(?:\d+[.,]?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*)")
+
+
+def option_number(text: str, where: str, fits: Callable[[float], bool] = lambda _: True) -> float:
+    """A number with a decimal point, or with a decimal comma.
+
+    Args:
+        fits: whether a value can be meant where a comma may also separate thousands.
+
+    Raises:
+        ValueError: for a text that is not a number.
+        TunnelError: for a comma with two meanings.
+    """
+    if not _DECIMAL_COMMA.fullmatch(text):
+        return float(text)
+    readings = [text.replace(",", "."), *([text.replace(",", "")] if _OF_THOUSANDS.fullmatch(text) else ())]
+    meant = [reading for reading in readings if fits(float(reading))] or readings
+    if len(meant) > 1:
+        what = f"'{text}' may be {meant[0]} or {meant[1]}"
+        raise TunnelError(what, where=where, remedy="give one of these")
+    return float(meant[0])
+
+
+def _settings_in(text: str) -> list[str]:
+    """The settings between commas; a comma between two whole numbers is a decimal one."""
+    parts: list[str] = []
+    for part in text.split(","):
+        if parts and re.fullmatch(r"\d+(\s*[^\s\d=][^=]*)?", part) and re.search(r"=\s*[+-]?\d+$", parts[-1]):
+            parts[-1] += f",{part}"
+        else:
+            parts.append(part)
+    return parts
+
+
+def _possible(key: str, factor: float, value: float) -> bool:
+    """Whether a condition may have a value, after its factor to SI."""
+    try:
+        plausible_values({key: factor * value}, "")
+    except TunnelError:
+        return False
+    return True
 
 
 def _factor(key: str, unit: str, where: str) -> float:
@@ -157,7 +201,7 @@ def parse_times(words: Sequence[str], option: str) -> dict[str, float]:
     for word in words:
         run, _, seconds = word.rpartition("=")
         try:
-            times[run.strip()] = float(seconds)
+            times[run.strip()] = option_number(seconds, option)
         except ValueError:
             what = f"'{one_line(word, 40)}' is not a time"
             raise TunnelError(what, where=option, remedy="give SECONDS or RUN=SECONDS") from None
@@ -167,15 +211,17 @@ def parse_times(words: Sequence[str], option: str) -> dict[str, float]:
 def parse_setting(text: str, where: str) -> tuple[Conditions, StatedBy]:
     """Conditions from ``key=value``, separated by commas; a value is a number, a number and its unit, or a name.
 
+    Numbers may have a decimal comma.
+
     Raises:
         TunnelError: for a text of another form, or a unit that does not measure the condition.
     """
     numbers: dict[str, float] = {}
     names: dict[str, str] = {}
-    for part in text.split(","):
+    for part in _settings_in(text):
         key, _, value = (piece.strip() for piece in part.partition("="))
         try:
-            numbers[key] = float(value)
+            numbers[key] = option_number(value, where, partial(_possible, key, 1.0))
         except ValueError:
             if not value:
                 what = f"'{part.strip()}' is not of the form key=number"
@@ -185,5 +231,6 @@ def parse_setting(text: str, where: str) -> tuple[Conditions, StatedBy]:
             if number is None or key not in Conditions.model_fields:
                 names[key] = value
             else:
-                numbers[key] = float(number[1]) * _factor(key, number[2], where)
+                factor = _factor(key, number[2], where)
+                numbers[key] = factor * option_number(number[1], where, partial(_possible, key, factor))
     return validate(Conditions, numbers, Path(where)), validate(StatedBy, names, Path(where))

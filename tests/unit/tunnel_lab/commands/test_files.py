@@ -15,6 +15,8 @@ from matplotlib.axes import Axes
 from tests.support.command import Tunnel
 from tests.support.import_files import csv as record
 from tests.support.import_files import decay, written
+from tunnel_sim.files.campaign_folder import read_campaign
+from tunnel_sim.files.importing.choices import read_recipe
 
 PNG = b"\x89PNG\r\n\x1a\n"
 
@@ -73,6 +75,19 @@ def test_bad_options_leave_nothing(
     assert (status, err.count("\n")) == (2, 1)
     assert what in err
     assert [path.name for path in tmp_path.iterdir()] == ["log.csv"]
+
+
+def test_options_take_a_decimal_comma(tunnel: Tunnel, tmp_path: Path) -> None:
+    out = tmp_path / "rig"
+    numbers = ("--set", "air_density=1,19,wind_speed=12,5", "--rest", "0,001", "--start", "0,5")
+    status, _, err = tunnel("import", record(tmp_path), "--out", out, "--yes", *numbers)
+    assert (status, err) == (0, "")
+    (run,) = read_campaign(out).runs
+    assert (run.air_density, run.wind_speed) == (1.19, 12.5)
+    assert read_recipe(out).rest == 0.001
+    assert read_recipe(out).start == 0.5
+    status, _, err = tunnel("import", record(tmp_path), "--out", out, "--yes", "--rate", "1,200")
+    assert (status, err) == (2, "tunnel: --rate: '1,200' may be 1.200 or 1200; give one of these\n")
 
 
 def test_one_file_is_identified_in_normalised_form(tunnel: Tunnel, tmp_path: Path) -> None:

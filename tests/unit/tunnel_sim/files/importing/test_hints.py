@@ -13,7 +13,7 @@ import scipy.io
 from identification import identify
 from tests.support.import_files import RATE, csv, decay, written
 from tunnel_sim import TunnelError
-from tunnel_sim.files.importing.choices import ImportChoices, parse_setting
+from tunnel_sim.files.importing.choices import ImportChoices, parse_setting, parse_times
 from tunnel_sim.files.importing.condition_names import condition_of, resembles
 from tunnel_sim.files.importing.conditions import Unstated
 from tunnel_sim.files.importing.records import read_records
@@ -326,9 +326,13 @@ def test_a_text_that_mentions_a_wind_is_not_passed_over(text: str, tmp_path: Pat
         ("reference_length=25cm", "reference_length", 0.25),
         ("air_density = 1.2 kg/m^3", "air_density", 1.2),
         ("release_angle=10 deg", "release_angle", np.deg2rad(10.0)),
+        ("air_density=1,19", "air_density", 1.19), ("spring_stiffness=16,12 N m/rad", "spring_stiffness", 16.12),
+        ("air_density=1,196,wind_speed=12,5", "air_density", 1.196),  # no air has 1196 kg/m3
+        ("wind_speed=54,5 km/h, air_density=1,2", "wind_speed", 54.5 / 3.6),
+        ("spring_stiffness=0,200,wind_speed=12", "spring_stiffness", 0.2),
     ],
 )  # fmt: skip
-def test_a_setting_may_have_a_unit(text: str, key: str, value: float) -> None:
+def test_a_setting_may_have_a_unit_and_a_decimal_comma(text: str, key: str, value: float) -> None:
     assert getattr(parse_setting(text, "--set")[0], key) == pytest.approx(value)
 
 
@@ -337,6 +341,14 @@ def test_a_unit_that_does_not_fit_a_setting_is_named() -> None:
         parse_setting("frontal_area=360 furlong", "--set")
     with pytest.raises(TunnelError, match="'%' is not a unit of repeatability_wind_speed"):
         parse_setting("repeatability_wind_speed=2 %", "--set")
+
+
+def test_a_comma_of_two_meanings_is_refused() -> None:
+    with pytest.raises(TunnelError, match=r"^--set: '1,200' may be 1\.200 or 1200; give one of these$"):
+        parse_setting("spring_stiffness=1,200", "--set")
+    assert parse_times(["log=14,27"], "--start") == {"log": 14.27}
+    with pytest.raises(TunnelError, match=r"^--start: '14,275' may be 14\.275 or 14275"):
+        parse_times(["log=14,275"], "--start")
 
 
 def test_refusals_of_one_file_come_together(tmp_path: Path) -> None:
