@@ -27,16 +27,26 @@ class TunnelError(Exception):
         where: the file, run or option concerned; empty when there is none.
         remedy: how to correct it.
         options: of ``tunnel import`` that correct it, each with its value, as in a command line.
+        parts: the refusals that it joins; empty where it is a single one.
 
     The text reads ``where: what; remedy`` and is always a single line. The command line prints it and exits with
     status 2.
     """
 
-    def __init__(self, what: str, *, where: str = "", remedy: str = "", options: Iterable[str] = ()) -> None:
+    def __init__(
+        self,
+        what: str,
+        *,
+        where: str = "",
+        remedy: str = "",
+        options: Iterable[str] = (),
+        parts: Sequence[TunnelError] = (),
+    ) -> None:
         self.what = one_line(what, _LONGEST)
         self.where = one_line(where, _LONGEST)
         self.remedy = one_line(remedy, _LONGEST)
         self.options = tuple(options)
+        self.parts = tuple(parts)
         text = f"{self.where}: {self.what}" if self.where else self.what
         super().__init__(f"{text}; {self.remedy}" if self.remedy else text)
 
@@ -54,10 +64,16 @@ def joined(faults: Sequence[TunnelError]) -> TunnelError:
     """Refusals of one place, at least one, as one refusal."""
     if len(faults) == 1:
         return faults[0]
+    faults = _parts(faults)
     what, remedy = (
         "; ".join(texts) for texts in zip(*((one.what, one.remedy) for one in faults), strict=True)
     )
-    return TunnelError(what, where=faults[0].where, remedy=remedy, options=_options(faults))
+    return TunnelError(what, where=faults[0].where, remedy=remedy, options=_options(faults), parts=faults)
+
+
+def _parts(faults: Iterable[TunnelError]) -> list[TunnelError]:
+    """The single refusals."""
+    return [part for fault in faults for part in fault.parts or (fault,)]
 
 
 def _options(faults: Iterable[TunnelError]) -> Iterator[str]:
@@ -69,6 +85,7 @@ def together(faults: Sequence[TunnelError]) -> TunnelError:
     """Refusals of several places, at least one, as one refusal; equal ones are stated once, with their places."""
     if len(faults) == 1:
         return faults[0]
+    faults = _parts(faults)
     places: dict[tuple[str, str], dict[str, None]] = {}
     for fault in faults:
         places.setdefault((fault.what, fault.remedy), {})[fault.where] = None

@@ -59,7 +59,9 @@ class Unread(TunnelError):
     """Columns of times and readings whose units or rate are to be stated."""
 
     def __init__(self, fault: TunnelError, columns: tuple[Channel | None, Channel]) -> None:
-        super().__init__(fault.what, where=fault.where, remedy=fault.remedy, options=fault.options)
+        super().__init__(
+            fault.what, where=fault.where, remedy=fault.remedy, options=fault.options, parts=fault.parts
+        )
         self.columns = columns
 
 
@@ -111,9 +113,14 @@ def find_columns(
         Unread: for all that is to be stated of the columns of a run.
     """
     found = []
-    for pair in find_pairs(table, choices, where):
+    several: list[TunnelError] = []  # all that is to be stated of a file is asked for at once
+    try:
+        pairs = find_pairs(table, choices, where)
+    except Unread as fault:  # the first of several columns that may be the angle, and what it asks for
+        several, pairs = [fault], [ColumnPair("", *fault.columns)]
+    for pair in pairs:
         said = [*pair.said]
-        faults: list[TunnelError] = []  # all that is to be stated of a file is asked for at once
+        faults = [*several]
         rows, facts = pair.reading.values.size, table.facts
         time = attempt(faults, lambda: in_seconds(pair.time, rows, facts, choices, said, where))  # noqa: B023
         # A row without a time is not a sample: a heading between two runs may hold other numbers.
@@ -124,10 +131,16 @@ def find_columns(
             faults,
             lambda: in_radians(counted, choices, calibration, said, where),  # noqa: B023
         )
-        if time is None or found_reading is None:
+        driven = None
+        if found_reading is not None:
+            reading, quantity, unit = found_reading
+            columns = table.channels, (pair.time, pair.reading)
+            driven = attempt(
+                faults,
+                lambda: find_input(*columns, reading, choices, said, where, unit),  # noqa: B023
+            )
+        if time is None or found_reading is None or faults:
             raise Unread(joined(faults), (pair.time, pair.reading))
-        reading, quantity, unit = found_reading
-        driven = find_input(table.channels, (pair.time, pair.reading), reading, choices, said, where, unit)
         if table.native:
             said += _apart(table, pair.reading, driven, choices, where)
             reading = reading if driven is None else _within(reading, driven, said)
@@ -318,7 +331,10 @@ def _readings(
     if len(found) > 1 and not of_runs:
         what = f"{len(found)} columns may be the angle: {listed(found)}"
         option = f'--angle "{found[0].name}"'
-        raise TunnelError(what, where=where, remedy=f"give {option}, or another of them", options=(option,))
+        several = TunnelError(
+            what, where=where, remedy=f"give {option}, or another of them", options=(option,)
+        )
+        raise Unread(several, (time, found[0]))
     said += [f"angle from '{stem(channel.name)}'" for channel in found if len(others) > 1]
     return found
 

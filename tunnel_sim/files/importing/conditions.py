@@ -28,7 +28,6 @@ from tunnel_sim.files.importing.remarks import ImportRemark, doubt
 from tunnel_sim.files.importing.tables import INPUT_FACTS, Channel, Table
 from tunnel_sim.files.importing.units import claims, known_unit, split_unit
 from tunnel_sim.files.plausible import plausible_values
-from tunnel_sim.files.reading import stem_of
 from tunnel_sim.files.toml_input import validate
 from tunnel_sim.vocabulary.campaign import needs_density
 from tunnel_sim.vocabulary.errors import TunnelError, counted, did_you_mean, one_line
@@ -290,64 +289,85 @@ def conditions_of(
     return found, sizes
 
 
-def refuse_open_conditions(
+def ask_conditions(
     table: Table,
     beside: Sequence[Channel | None],
     choices: ImportChoices,
-    named: Sequence[Hint],
+    named: Mapping[str, float],
+    hints: Sequence[Hint],
     where: str,
+    *,
+    later: bool,
 ) -> None:
     """Refuse a table without a condition that only the user can state, before its records are known.
 
     Args:
-        named: conditions that the name of the file seems to state; the others are as above.
+        named: conditions stated by the name of the file, or for it.
+        hints: conditions that the name of the file seems to state; the others are as above.
     """
     stated = find_conditions(table, beside, choices, [], where)
     rows = np.ones(table.channels[0].values.size, dtype=bool)
     given = choices.conditions.model_dump(exclude_none=True)
-    known = {**stated.numbers, **stated.measured(rows, []), **given}
-    check_wind(known, [*stated.unused(rows), *named], Path(), "", [], where, driven=True)
-    check_density(known, known, where)
+    known = {**stated.numbers, **stated.measured(rows, []), **named, **given}
+    open_conditions(known, known, [*stated.unused(rows), *hints], "", where, driven=True, later=later)
 
 
-def check_density(conditions: Mapping[str, float], sizes: Mapping[str, float], where: str) -> None:
-    """Refuse a run with the wind on whose air density is needed and not stated."""
-    scales = conditions.get("spring_stiffness"), sizes.get("frontal_area"), sizes.get("reference_length")
-    wind = conditions.get("wind_speed", 0.0)
-    if needs_density(wind, *scales) and "air_density" not in conditions:
-        what = f"wind-on ({wind:g} m/s) without air_density"
-        option = "--set air_density=1.2"
-        remedy = f"give {option} (kg/m3, about 1.2 for air)"
-        raise Unstated(what, where=where, remedy=remedy, options=(option,))
+_DENSITY = "--set air_density=1.2"
+_OF_AIR = f"{_DENSITY} (kg/m3, about 1.2 for air)"
 
 
-def check_wind(
-    conditions: Mapping[str, float],
+def open_conditions(
+    known: Mapping[str, float],
+    sizes: Mapping[str, float | None],
     hints: Sequence[Hint],
-    file: Path,
-    run: str,
-    said: list[str],
+    name: str,
     where: str,
     *,
     driven: bool,
-) -> None:
-    """Report unused content that resembles a condition; refuse to assume wind-off where a wind is suggested."""
-    open_ones = [hint for hint in hints if hint.key not in conditions]
-    said += [doubt(hint.words, hint.short) for hint in open_ones]
-    if "wind_speed" in conditions:
-        return
+    later: bool,
+) -> tuple[list[ImportRemark], bool]:
+    """Remarks on unused content that resembles a condition, and whether an air density is missing.
+
+    Wind-off is not assumed where a wind is suggested; what the wind needs beside its speed is asked for at once.
+
+    Args:
+        known: conditions of the run.
+        sizes: of the rig; None: not stated.
+        name: of file and run, which may mention a wind.
+        later: whether a missing air density may be stated later.
+
+    Raises:
+        Unstated: for all that only the user can state.
+    """
+    open_ones = [hint for hint in hints if hint.key not in known]
+    remarks = [doubt(hint.words, hint.short) for hint in open_ones]
+    scales = known.get("spring_stiffness"), sizes.get("frontal_area"), sizes.get("reference_length")
+    if "wind_speed" in known:
+        wind = known["wind_speed"]
+        missing = needs_density(wind, *scales) and "air_density" not in known
+        if missing and not later:
+            what, remedy = f"wind-on ({wind:g} m/s) without air_density", f"give {_OF_AIR}"
+            raise Unstated(what, where=where, remedy=remedy, options=(_DENSITY,))
+        return remarks, missing
+    suggested = {hint.key for hint in open_ones}
+    needed = needs_density(1.0, *scales) or "spring_stiffness" in suggested
+    dense = not later and needed and "air_density" not in {*known, *suggested}
+    beside, options = (f", with {_OF_AIR};", (_DENSITY,)) if dense else (",", ())
     wind_off = "--set wind_speed=0 states wind-off"
     for hint in open_ones:
         letter = hint.symbol and driven  # beside a command it is a velocity or another command
         if hint.key == "wind_speed" and hint.value != 0.0 and not letter:
             left_out = hint.brief.rpartition(";")[0] or f"{hint.what} is left out: {hint.why}"
             what = f"{left_out}; wind-off is not assumed beside it"
-            options = filter(None, (hint.option,))
-            raise Unstated(what, where=where, remedy=f"{hint.use}, {wind_off}", options=options)
-    if WIND_ON.search(f"{stem_of(file)} {run}"):
+            remedy = f"{hint.use}{beside} {wind_off}"
+            raise Unstated(what, where=where, remedy=remedy, options=filter(None, (hint.option, *options)))
+    if WIND_ON.search(name):
         what = "the name states that the wind is on, but not its speed"
         option = "--set wind_speed=SPEED"
-        remedy = f"give {option} (m/s), --conditions or --name"
-        raise Unstated(what, where=where, remedy=remedy, options=(option,))
+        remedy = f"give {option} (m/s), --conditions or --name{beside.rstrip(',;')}"
+        raise Unstated(what, where=where, remedy=remedy, options=(option, *options))
     if not driven:
-        said.append(doubt("wind_speed is not stated: wind-off is assumed; --set wind_speed=SPEED states it"))
+        remarks.append(
+            doubt("wind_speed is not stated: wind-off is assumed; --set wind_speed=SPEED states it")
+        )
+    return remarks, False

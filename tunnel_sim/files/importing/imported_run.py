@@ -10,7 +10,7 @@ from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.cleaning import clipped, clock_text, from_rest, from_zero
 from tunnel_sim.files.importing.condition_names import Hint
 from tunnel_sim.files.importing.condition_table import ConditionTable
-from tunnel_sim.files.importing.conditions import Unstated, check_density, check_wind, conditions_of
+from tunnel_sim.files.importing.conditions import conditions_of, open_conditions
 from tunnel_sim.files.importing.raw_records import RawRecord
 from tunnel_sim.files.importing.releases import RecordPiece, stated_piece
 from tunnel_sim.files.importing.remarks import ImportRemark, doubt, doubt_of_motion
@@ -92,15 +92,12 @@ def imported_run(
     rows = raw.rows(float(time[0]), float(time[-1]))
     stated, sizes = conditions_of(raw.stated, raw.source, name, rows, choices, table, remarks, where)
     hints = [*raw.stated.unused(rows), *named]
-    check_wind(stated, hints, raw.source, name, remarks, where, driven=raw.input is not None)
+    named_by = f"{stem_of(raw.source)} {name}"
+    driven, common = raw.input is not None, choices.conditions.model_dump()
+    asked, windy = open_conditions(stated, common, hints, named_by, where, driven=driven, later=later)
+    remarks += asked
     held: dict[str, float] = {}
-    windy = False
-    try:
-        check_density(stated, choices.conditions.model_dump(), where)
-    except Unstated:
-        if not later:
-            raise
-        windy = True
+    if windy:
         held = {key: stated.pop(key) for key in ("spring_stiffness",) if key in stated}
         remarks.append(doubt(f"air_density is not stated (wind-on, {stated['wind_speed']:g} m/s)"))
     drive = _drive(raw, kept, choices, remarks)

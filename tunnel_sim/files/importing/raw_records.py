@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -17,11 +18,12 @@ from tunnel_sim.files.importing.cleaning import Cleaned, cleaned, restarts
 from tunnel_sim.files.importing.column_numbers import Calibration
 from tunnel_sim.files.importing.columns import RunColumns, Unread, find_columns, with_readings
 from tunnel_sim.files.importing.condition_names import Hint
+from tunnel_sim.files.importing.condition_table import ConditionTable
 from tunnel_sim.files.importing.conditions import (
     Stated,
+    ask_conditions,
     find_conditions,
     of_short_table,
-    refuse_open_conditions,
     stated_remark,
 )
 from tunnel_sim.files.importing.source import Source
@@ -79,14 +81,16 @@ def raw_records(
     hints: Sequence[Hint],
     *,
     several: bool,
-    with_table: bool = False,
+    conditions: ConditionTable | None = None,
+    later: bool = False,
 ) -> list[RawRecord]:
     """The records of a file, with the conditions in its name.
 
     Args:
         several: whether ids must name the file among others.
-        with_table: whether a table may state the conditions.
+        conditions: a table of conditions; None: there is none.
         hints: conditions that the name of the file seems to state.
+        later: whether missing air densities may be stated later.
     """
     # A short table beside longer ones contains conditions or sizes.
     long = [table for table in source.tables if table.channels[0].values.size >= LEAST_ROWS]
@@ -97,11 +101,14 @@ def raw_records(
         try:
             every = find_columns(table, choices, calibration, where)
         except Unread as fault:
-            if with_table or "wind_speed" in named:
-                raise
             faults: list[TunnelError] = [fault]  # what is to be stated of a file is asked for at once
-            beside = fault.columns
-            attempt(faults, partial(refuse_open_conditions, table, beside, choices, hints, where))
+            with suppress(TunnelError):  # the table may name runs that are not known yet
+                stated_of = {} if conditions is None else conditions.of(source.path, stem_of(source.path))
+                used, known = fault.columns, named | stated_of
+                attempt(
+                    faults,
+                    partial(ask_conditions, table, used, choices, known, hints, where, later=later),
+                )
             raise joined(faults) from None
         for columns in every:
             said = [*columns.said]

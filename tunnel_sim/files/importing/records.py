@@ -120,7 +120,11 @@ def read_records(
     table = None if conditions is None else ConditionTable(conditions)
     kept = [path for path in files if path.name not in choices.leave_out]
     hints = name_hints(kept) if kept else {}
-    sources, raws = _raws(kept, choices, hints, several=len(files) > 1, with_table=table is not None)
+    faults: list[TunnelError] = []  # what is to be stated of all files and runs is asked for at once
+    sources, raws = _raws(kept, choices, hints, table, faults, several=len(files) > 1, later=later)
+    parts = _parts(raws, choices, table, hints, faults, later=later)
+    if faults:
+        raise _refusal(faults)
     if not raws:
         what = "every file is left out" if files else "no files"
         raise TunnelError(what, remedy="name at least one")
@@ -128,7 +132,6 @@ def read_records(
     if len(kinds) > 1:
         remedy = "import one quantity at a time, with --angle"
         raise TunnelError(f"the runs contain {' and '.join(sorted(kinds))}", remedy=remedy)
-    parts = _parts(raws, choices, table, hints, later=later)
     runs = {part.id for part in parts}
     for one in (one for one in choices.stretches if one.file is None and one.run not in runs):
         raise TunnelError(f"no run '{one.run}'", where="--start, --end", remedy=did_you_mean(one.run, runs))
@@ -176,27 +179,33 @@ def _raws(
     files: Sequence[Path],
     choices: ImportChoices,
     hints: Mapping[Path, Sequence[Hint]],
+    table: ConditionTable | None,
+    faults: list[TunnelError],
     *,
     several: bool,
-    with_table: bool,
+    later: bool,
 ) -> tuple[list[Source], list[RawRecord]]:
-    """Files and their records; what is to be stated of all files is asked for at once."""
+    """The files that can be read, and their records; the refusals of others are added to the faults."""
     calibration = read_calibration(choices.calibration)
     pattern = None if choices.name is None else name_pattern(choices.name)
     sources: list[Source] = []
     raws: list[RawRecord] = []
-    faults: list[TunnelError] = []
     for path in files:
         try:
             source, named = read_source(path, choices), from_name(pattern, path)
             raws += raw_records(
-                source, choices, calibration, named, hints[path], several=several, with_table=with_table
+                source,
+                choices,
+                calibration,
+                named,
+                hints[path],
+                several=several,
+                conditions=table,
+                later=later,
             )
             sources.append(source)
         except TunnelError as fault:
             faults.append(fault)
-    if faults:
-        raise _refusal(faults)
     return sources, raws
 
 
@@ -205,13 +214,13 @@ def _parts(
     choices: ImportChoices,
     table: ConditionTable | None,
     hints: Mapping[Path, Sequence[Hint]],
+    faults: list[TunnelError],
     *,
     later: bool,
 ) -> list[ImportedRun]:
-    """The runs of all records, cut at releases; what is to be stated of all runs is asked for at once."""
+    """The runs of all records, cut at releases; the refusals of others are added to the faults."""
     ids = [raw.id for raw in raws]
     parts = []
-    faults: list[TunnelError] = []
     for at, raw in enumerate(raws):
         label = raw.id if ids.count(raw.id) == 1 else f"{raw.id}-{ids[: at + 1].count(raw.id)}"
         pieces = _pieces(raw, choices)
@@ -222,8 +231,6 @@ def _parts(
                 parts.append(imported_run(run, raw, piece, choices, table, hints[raw.source], later=later))
             except TunnelError as fault:
                 faults.append(fault)
-    if faults:
-        raise _refusal(faults)
     return parts
 
 

@@ -369,6 +369,41 @@ def test_refusals_of_one_file_come_together(tmp_path: Path) -> None:
     np.testing.assert_allclose(run.record.yaw_rad, ANGLE, atol=1e-7)
 
 
+def asked(paths: list[Path], choices: ImportChoices = ImportChoices()) -> TunnelError:  # noqa: B008 - frozen
+    with pytest.raises(TunnelError) as caught:
+        read_records(paths, choices)
+    return caught.value
+
+
+def test_the_density_is_asked_for_with_the_wind(tmp_path: Path) -> None:
+    paths = [csv(tmp_path, f"V{speed}_K16p1.csv", speed + 1) for speed in (0, 12, 24)]
+    fault = asked(paths)
+    assert fault.options == ('--name "V{wind_speed}_K{spring}"', "--set air_density=1.2")
+    assert "with --set air_density=1.2 (kg/m3, about 1.2 for air); --set wind_speed=0" in fault.remedy
+    choices = setting("air_density=1.2").model_copy(update={"name": "V{wind_speed}_K{spring}"})
+    assert [run.wind_speed for run in read_records(paths, choices).campaign.runs] == [0.0, 12.0, 24.0]
+    for stated in ("wind_speed=0", "air_density=1.2"):
+        said = str(asked(paths, setting(stated)) if "air" in stated else read_records(paths, setting(stated)))
+        assert "--set air_density" not in said
+    alone = csv(tmp_path, "V12.csv")  # without a stiffness or a size the run gives ωn and ζ only
+    assert asked([alone]).options == ('--name "V{wind_speed}"',)
+
+
+def test_columns_and_conditions_of_all_files_are_one_question(tmp_path: Path) -> None:
+    """Two columns that may be the angle, in counts, beside a wind and a stiffness without a density."""
+    wind = "wind speed [m/s];K [N m/rad]"
+    rows = "\n".join(f"{t:.3f};{1e4 * y:.0f};{9e3 * y:.0f};12;16.1" for t, y in zip(TIME, ANGLE, strict=True))
+    two = [written(tmp_path, f"{n}.csv", f"t [s];enc [counts];aux [counts];{wind}\n{rows}\n") for n in "ab"]
+    rows = "\n".join(f"{t:.3f};{y:.8f};12;16.1" for t, y in zip(TIME, ANGLE, strict=True))
+    read = written(tmp_path, "c.csv", f"t [s];yaw [rad];{wind}\n{rows}\n")
+    fault = asked([*two, read])
+    assert fault.options == ('--angle "enc"', "--counts-per-turn N", "--set air_density=1.2")
+    for once in ("2 columns may be the angle", "'enc' is in counts", "without air_density"):
+        assert str(fault).count(once) == 1
+    choices = setting("air_density=1.2").model_copy(update={"counts_per_turn": 16384.0, "angle": ("enc",)})
+    assert len(read_records(two, choices).campaign.runs) == 2
+
+
 @pytest.mark.parametrize(("per_cycle", "kept"), [(9.1, True), (6.3, True), (4.6, True), (3.3, False)])
 def test_few_samples_per_cycle_are_accepted_with_a_note(per_cycle: float, kept: bool, tmp_path: Path) -> None:
     time = np.arange(400) / (2.0 * per_cycle)
