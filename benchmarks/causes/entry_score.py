@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import heapq
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -17,10 +17,14 @@ import numpy as np
 
 from benchmarks.causes.entry import NAMES, UNKNOWN, About
 from benchmarks.causes.make import SEAL, truths_by_track
+from diagnosis.answer.run_deviations import Spread
+from diagnosis.findings.decision import decision
 from diagnosis.findings.terms import SCATTERS
+from diagnosis.settings import Settings
+from identification.show.quantity import Quantity
 from identification.statistics import Proportion
 from tunnel_lab.experiments.blind.cases import NAMES as COEFFICIENTS
-from tunnel_lab.experiments.blind.cases import Case, case, found_by_group, inclusions
+from tunnel_lab.experiments.blind.cases import Case, ScoredAnswer, case, found_by_group, inclusions
 from tunnel_lab.experiments.blind.scatter_score import scatter_score
 from tunnel_lab.experiments.blind.set_score import calibration, smooth_calibration
 from tunnel_sim.files.reading import as_described
@@ -104,36 +108,37 @@ def as_case(name: str, truth: Mapping[str, Any], answer: Mapping[str, Any]) -> C
         truth: from the key.
         answer: an entry's document.
     """
-    causes = answer["causes"]
-    own = None if causes is None else tuple(sorted(causes))
+    seconds = float(answer.get("seconds", 0.0))
+    if answer["causes"] is None:
+        return case(name, truth, ScoredAnswer(seconds=seconds))
+    own = tuple(sorted(answer["causes"]))
     # the given answer comes first, as the blind checks expect; the order of equals does not matter
-    sets = sorted(likely_sets(answer), key=lambda one: (one[0] != own, -one[1])) if own is not None else []
-    document = {
-        "causes": causes,
-        "candidates": [
-            {"effect": " + ".join(names) or "none", "probability": min(p, 1.0)} for names, p in sets
-        ],
-        "inclusion": {n: float(answer["probability"].get(n, 0.0)) for n in NAMES} if own is not None else {},
-        "coefficients": answer.get("coefficients", {}),
-        "repeatability": {"spreads": _spreads(answer.get("scatter", {}))},
-        "gap": {"closed": 0.0},  # not required of entries
-        "wall_s": float(answer.get("seconds", 0.0)),
-    }
-    return case(name, truth, document)
+    sets = sorted(likely_sets(answer), key=lambda one: (one[0] != own, -one[1]))
+    likely = [(" + ".join(names) or "none", min(p, 1.0)) for names, p in sets]
+    stated = answer.get("coefficients", {})
+    before, after = (
+        {key: Quantity(one["value"], one["std"], "1/rad") for key, one in stated.get(when, {}).items() if one}
+        for when in ("before", "after")
+    )
+    said = ScoredAnswer(
+        causes=tuple(answer["causes"]),
+        probabilities=dict(likely),
+        decision=decision(likely, Settings().answer) if likely else None,
+        inclusion={n: float(answer["probability"].get(n, 0.0)) for n in NAMES},
+        before=before,
+        after=after,
+        spreads=tuple(_spreads(answer.get("scatter", {}))),
+        seconds=seconds,
+    )
+    return case(name, truth, said)
 
 
-def _spreads(scatter: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """An entry's scatter between runs, in the form of a diagnosis."""
+def _spreads(scatter: Mapping[str, Any]) -> Iterator[Spread]:
+    """An entry's scatter between runs."""
     effects = {number: name for name, number in SCATTERS.items()}
-    return [
-        {
-            "effect": effects[number],
-            "width": one["value"],
-            "interval": one["interval_90"],
-            "shown": one["named"],
-        }
-        for number, one in scatter.items()
-    ]
+    for number, one in scatter.items():
+        low, high = one["interval_90"]
+        yield Spread(effects[number], one["value"], (low, high), None, one["named"], {})
 
 
 def log_score(cases: Sequence[Case]) -> float | None:
@@ -174,7 +179,7 @@ def figures(cases: Sequence[Case]) -> dict[str, Any]:
     found.pop("group", None)
     given = [(c.probability, c.right) for c in cases if c.probability is not None]
     error, bins = calibration([p for p, _ in given], [right for _, right in given])
-    seconds = [c.answer.wall_s or 0.0 for c in cases]
+    seconds = [c.answer.seconds or 0.0 for c in cases]
     return {
         "campaigns": len(cases),
         **found,

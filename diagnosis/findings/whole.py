@@ -307,6 +307,8 @@ class Findings:
             found = cast(Self, adapter.validate_json(json.dumps(_by_field(data)), strict=True))
             unknown = next(_unknown_keys(data, found.to_json_dict()), "")
             stated = dict(found.provenance.get("settings", {}))
+            if not all(isinstance(value, int | float) for value in stated.values()):
+                raise TypeError("a setting is not a number")
         if unknown:
             what = f"is not a diagnosis ({one_line(unknown, 60)}: unknown key)"
             raise TunnelError(what, where=where, remedy=remedy)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from diagnosis.result import Diagnosis
 from tunnel_sim.files.reading import as_described, read_json
@@ -22,8 +24,21 @@ def read_diagnosis(path: Path) -> Diagnosis:
     """
     document = read_json(path, remedy=REMEDY)
     check_version(document, path)
-    found = Diagnosis.from_json_dict(document, where=shown(path), remedy=REMEDY)
-    with as_described("is not a diagnosis", shown(path), REMEDY):
+    return diagnosis_of(document, shown(path), REMEDY)
+
+
+def diagnosis_of(document: Mapping[str, Any], where: str, remedy: str) -> Diagnosis:
+    """The diagnosis of a document, as `Diagnosis.from_json_dict`, whose values can be shown.
+
+    Args:
+        where: the document is from, in an error.
+        remedy: in an error.
+
+    Raises:
+        TunnelError: when it is not the document of a diagnosis.
+    """
+    found = Diagnosis.from_json_dict(document, where=where, remedy=remedy)
+    with as_described("is not a diagnosis", where, remedy):
         _check(found)
     return found
 
@@ -40,13 +55,17 @@ def _check(found: Diagnosis) -> None:
     ]
     if not all(text.isprintable() for text in texts):
         raise ValueError("a name has line breaks or control characters")
-    for share in (found.gap.closed, *(candidate.probability for candidate in found.candidates)):
+    probabilities = [*found.inclusion.values(), *(candidate.probability for candidate in found.candidates)]
+    for share in (found.gap.closed, *probabilities):
         if not 0.0 <= share <= 1.0:
             raise ValueError(f"{share:g} is not a share from 0 to 1")
     for given in (one for group in named for one in group.values()):
         dimension(given.unit)
         if given.std is not None and given.std < 0.0:
             raise ValueError(f"a standard deviation is {given.std:g}")
+    for spread in found.repeated.spreads:
+        if min(spread.width, *spread.interval) < 0.0:
+            raise ValueError(f"the width of a scatter is {spread.width:g}")
     units = {found.gap.misfit.unit, *([found.maps.unit] if found.maps else [])}
     for unit in units - READING_UNITS:
         raise ValueError(f"{unit!r} is no unit of a reading")

@@ -239,6 +239,14 @@ def test_independent_causes_make_sets():
     assert [p for _, p in sets] == sorted((p for _, p in sets), reverse=True)
 
 
+def test_a_sure_and_wrong_answer_is_counted_as_stated_wrongly():
+    from benchmarks.causes.entry_score import as_case
+
+    truth = {"effects": ["free_play"]}
+    sure, unsure = (as_case("c", truth, answer_of(["mains_hum"], {"mains_hum": p})) for p in (0.99, 0.45))
+    assert [sure.stated_wrongly, unsure.stated_wrongly] == [True, False]
+
+
 def test_coefficients_count_within_two_standard_deviations(small):
     from benchmarks.causes.entry_score import as_case
 

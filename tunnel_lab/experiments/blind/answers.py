@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from operator import attrgetter
@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from diagnosis._diagnose import diagnose, vocabulary
+from tunnel_lab.experiments.blind.cases import ScoredAnswer
 from tunnel_lab.experiments.blind.sets import (
     SCHEMA_VERSION,
     SEAL,
@@ -27,6 +28,7 @@ from tunnel_lab.experiments.blind.sets import (
 )
 from tunnel_lab.experiments.experiment import Done, Experiment, run
 from tunnel_lab.experiments.runner import Progress, Workers, processes
+from tunnel_lab.report.diagnosis_file import diagnosis_of
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.expression_effect import read_effects
 from tunnel_sim.effects.registry import answering_with
@@ -123,6 +125,25 @@ def answer_set(
     target = output_folder(answers_folder(folder, excluded, effects_file))
     run(answers, Sealed(target, about), workers or processes(0), progress)
     return file_hash(target / SEAL)
+
+
+def scored(document: Mapping[str, Any], where: str) -> ScoredAnswer:
+    """The answer in a document of `answer_campaign`.
+
+    Args:
+        where: it is from, in an error.
+
+    Raises:
+        TunnelError: when it is not an answer.
+    """
+    if document.get("causes", ()) is None:
+        return ScoredAnswer()
+    given, remedy = dict(document), "answer the set again"
+    given.pop("data_sha256", None)
+    seconds = given.pop("wall_s", None)
+    if not isinstance(seconds, float | None):
+        raise TunnelError("is not an answer (wall_s: not a number of seconds)", where=where, remedy=remedy)
+    return ScoredAnswer.of(diagnosis_of(given, where, remedy), seconds)
 
 
 def answer_campaign(folder: Path, excluded: Sequence[str] = (), effects_file: Path | None = None) -> Done:

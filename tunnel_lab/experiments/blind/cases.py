@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Annotated, Any
+from dataclasses import dataclass, field
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict
 
-from diagnosis.findings.decision import Decision, Predictions, decision
+from diagnosis.answer.run_deviations import Spread
+from diagnosis.findings.decision import Decision
 from diagnosis.findings.terms import SCATTERS
+from diagnosis.findings.whole import Findings
 from diagnosis.search.weigh import UNKNOWN
-from diagnosis.settings import Settings
+from identification.show.quantity import Quantity
 from identification.statistics import Proportion
 from tunnel_sim.effects import known_effects
 from tunnel_sim.effects.capabilities import OutOfPhase
@@ -24,11 +26,8 @@ MODERATE = (1.0, 10.0)
 """Excess of a moderate gap: 1 to 10 noise variances."""
 
 
-_Probability = Annotated[float, Field(ge=0.0, le=1.0)]
-
-
 class _Read(BaseModel):
-    """The scored part of a document; the rest is ignored."""
+    """The scored part of a truth; the rest is ignored."""
 
     model_config = ConfigDict(strict=True, allow_inf_nan=False)
 
@@ -54,72 +53,49 @@ class _Truth(_Read):
     in_phase: dict[str, float] = {}
 
 
-class _Settings(_Read):
-    settings: dict[str, int | float] = {}
+@dataclass(frozen=True)
+class ScoredAnswer:
+    """An answer to be scored: of `diagnose`, or of another method.
 
+    Args:
+        causes: effect names; None: there is no answer.
+        ambiguous_with: effects that the runs cannot distinguish from the causes.
+        probabilities: of the answers weighed, by their effects.
+        decision: on these; None where there are none.
+        inclusion: by effect, the probability that it is a cause.
+        before: coefficients of the nominal model, by name.
+        after: with the causes.
+        spreads: scatter between the runs.
+        closed: share of the gap that the causes close.
+        seconds: time that the answer took, s; None: not known.
+    """
 
-class _Candidate(_Read):
-    effect: str
-    probability: _Probability
+    causes: tuple[str, ...] | None = None
+    ambiguous_with: tuple[str, ...] = ()
+    probabilities: Mapping[str, float] = field(default_factory=dict)
+    decision: Decision | None = None
+    inclusion: Mapping[str, float] = field(default_factory=dict)
+    before: Mapping[str, Quantity] = field(default_factory=dict)
+    after: Mapping[str, Quantity] = field(default_factory=dict)
+    spreads: tuple[Spread, ...] = ()
+    closed: float = 0.0
+    seconds: float | None = None
 
-
-class _Coefficient(_Read):
-    value: float
-    std: Annotated[float, Field(ge=0.0)] | None  # none where the runs do not determine it
-    interval: tuple[float, float] | None = Field(None, strict=False)
-
-
-class _Coefficients(_Read):
-    before: dict[str, _Coefficient | None] = {}
-    after: dict[str, _Coefficient | None] = {}
-
-
-class _Gap(_Read):
-    closed: float | None = None
-
-
-class ScoredSpread(_Read):
-    """The width of a scatter between runs, relative, its 90 % interval, and whether the runs show it."""
-
-    effect: str = Field(description="name of the scatter")
-    width: NotNegative = Field(description="standard deviation between runs, relative")
-    interval: tuple[NotNegative, NotNegative] = Field(strict=False, description="its central 0.90, relative")
-    shown: bool = Field(description="whether the runs show it")
-
-
-class _Repeatability(_Read):
-    spreads: list[ScoredSpread] = []
-
-
-class ScoredAnswer(_Read):
-    """The scored part of an answer, which may be of another method and lack the rest of a diagnosis."""
-
-    causes: list[str] | None = Field(description="effect names; null: there is no answer")
-    repeatability: _Repeatability | None = Field(None, description="the scatter between runs")
-    ambiguous_with: list[str] = Field(
-        [], description="effects that the runs cannot distinguish from the causes"
-    )
-    candidates: list[_Candidate] = Field([], description="the answers weighed, with their probabilities")
-    doubts: list[Any] = Field([], description="against the predictions of the answer")
-    inclusion: dict[str, _Probability] = Field(
-        {}, description="by effect, the probability that it is a cause"
-    )
-    coefficients: _Coefficients = Field(_Coefficients(), description="before and after the causes are added")
-    gap: _Gap | None = Field(None, description="the share of the gap that the causes close")
-    wall_s: float | None = Field(None, description="time that the answer took, s")
-    provenance: _Settings = Field(_Settings(), description="the settings that differ from the usual ones")
-
-    @property
-    def closed(self) -> float | None:
-        """Share of the gap that the causes close; None where it is not stated."""
-        return None if self.gap is None else self.gap.closed
-
-    @model_validator(mode="after")
-    def _closed_where_named(self) -> ScoredAnswer:
-        causes = [name for name in self.causes or () if name not in SCATTERS]
-        if causes and causes != ["unknown"] and self.closed is None:
-            raise ValueError("causes without the share of the gap that they close")
-        return self
+    @classmethod
+    def of(cls, found: Findings, seconds: float | None = None) -> ScoredAnswer:
+        """The answer of a diagnosis."""
+        return cls(
+            causes=found.causes,
+            ambiguous_with=found.ambiguous_with,
+            probabilities={one.effect: one.probability for one in found.candidates},
+            decision=found.decision if found.candidates else None,
+            inclusion=found.inclusion,
+            before=found.coefficients.before,
+            after=found.coefficients.after,
+            spreads=found.repeated.spreads,
+            closed=found.gap.closed,
+            seconds=seconds,
+        )
 
 
 @dataclass(frozen=True)
@@ -202,10 +178,9 @@ class Case:
         )
 
     @property
-    def spreads(self) -> dict[str, ScoredSpread]:
+    def spreads(self) -> dict[str, Spread]:
         """The answer on the scatter of each quantity."""
-        said = [] if self.answer.repeatability is None else self.answer.repeatability.spreads
-        return {SCATTERS[one.effect]: one for one in said if one.effect in SCATTERS}
+        return {SCATTERS[one.effect]: one for one in self.answer.spreads if one.effect in SCATTERS}
 
     @property
     def right(self) -> bool:
@@ -248,18 +223,12 @@ class Case:
     @property
     def probability(self) -> float | None:
         """Probability of the answer given; None where it is not among the candidates."""
-        wanted = " + ".join(self.answer.causes or ()) or "none"
-        return next((one.probability for one in self.answer.candidates if one.effect == wanted), None)
+        return self.answer.probabilities.get(" + ".join(self.answer.causes or ()) or "none")
 
     @property
     def decision(self) -> Decision | None:
         """Whether the answer is decided, and the smallest set of likely ones; None where there is no answer."""
-        answers = [(one.effect, one.probability) for one in self.answer.candidates]
-        if not answers:
-            return None
-        settings = Settings().changed(self.answer.provenance.settings)
-        found = decision(answers, settings.answer, Predictions(held_out=self.answer.closed))
-        return replace(found, decided=found.decided and not self.answer.doubts)
+        return self.answer.decision
 
     @property
     def stated_wrongly(self) -> bool:
@@ -284,29 +253,24 @@ class Case:
 
     def error(self, name: str, when: str) -> CoefficientError | None:
         """Error of ``cn_beta`` or ``cn_r``, ``before`` or ``after`` the causes are added; None if not stated."""
-        stated = self.answer.coefficients
-        found = (stated.before if when == "before" else stated.after).get(name)
+        found = (self.answer.before if when == "before" else self.answer.after).get(name)
         truth = self.coefficients.get(name)
         if found is None or not truth or not found.std:
             return None
-        error, reach = found.value - truth, 1.96 * found.std
-        low, high = found.interval or (found.value - reach, found.value + reach)
+        error, (low, high) = found.value - truth, found.ends
         return CoefficientError(error / found.std, error / abs(truth), low <= truth <= high)
 
 
-def case(
-    name: str, truth: Mapping[str, Any], answer: Mapping[str, Any], excluded: Sequence[str] = ()
-) -> Case:
-    """Combine a truth, from the key, and an answer: the document of a diagnosis, or the scored part of one.
+def case(name: str, truth: Mapping[str, Any], said: ScoredAnswer, excluded: Sequence[str] = ()) -> Case:
+    """Combine a truth, from the key, and an answer.
 
     Args:
         excluded: effects withheld from the vocabulary; a truth with one of them is ``unknown``.
 
     Raises:
-        ValueError: when truth or answer is malformed (pydantic's, with the place).
+        ValueError: when the truth is malformed (pydantic's, with the place).
     """
     stated = _Truth.model_validate(truth)
-    said = ScoredAnswer.model_validate(answer)
     effects = tuple(sorted(stated.effects))
     withheld = bool(set(effects) & set(excluded))
     lagging = {kind.name for kind in known_effects() if issubclass(kind, OutOfPhase)}

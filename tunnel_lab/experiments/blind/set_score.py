@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from diagnosis.search.weigh import UNKNOWN
 from identification.statistics import Proportion
-from tunnel_lab.experiments.blind.answers import answers_folder
+from tunnel_lab.experiments.blind.answers import answers_folder, scored
 from tunnel_lab.experiments.blind.cases import (
     NAMES,
     Case,
@@ -303,7 +303,7 @@ class BlindScore:
 
     def closure(self) -> tuple[Proportion, float, float]:
         """For rightly named campaigns: proportion that closes 0.95 on held-out runs; median and 5th percentile."""
-        closed = [c.answer.closed or 0.0 for c in self.cases if c.named_rightly]
+        closed = [c.answer.closed for c in self.cases if c.named_rightly]
         if not closed:
             return Proportion(0, 0), 0.0, 0.0
         return (
@@ -336,7 +336,7 @@ class BlindScore:
 
     def seconds(self) -> tuple[float, float, float]:
         """Wall time per campaign, s: median, 90th percentile and largest; zeros where it is not known."""
-        times = [c.answer.wall_s for c in self.cases if c.answer.wall_s is not None]
+        times = [c.answer.seconds for c in self.cases if c.answer.seconds is not None]
         if not times:
             return 0.0, 0.0, 0.0
         return float(np.median(times)), float(np.quantile(times, 0.9)), max(times)
@@ -442,9 +442,9 @@ def score_set(
         key_sha256, made_with = "", {}
     cases = []
     for path in campaigns:
-        where, remedy = shown(path), "answer the set again, or name the right key"
-        with as_described("truth or answer is malformed", where, remedy):
-            cases.append(case(path.name, truths[path.name], answers[path.name], excluded))
+        said = scored(answers[path.name], shown(path))
+        with as_described("the truth is malformed", shown(path), "name the right key"):
+            cases.append(case(path.name, truths[path.name], said, excluded))
     return BlindScore(
         tuple(cases), tuple(sorted(set(excluded))), key_sha256, answers_sha256, made_with, bool(key_sha256)
     )

@@ -5,19 +5,23 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from diagnosis import Settings
+from diagnosis.findings.decision import decision
 from identification.statistics import Proportion
-from tests.unit.tunnel_lab.experiments.blind.test_set_score import document
+from tests.unit.tunnel_lab.experiments.blind.test_set_score import document, told
 from tunnel_lab.experiments.blind import score_page as blind
-from tunnel_lab.experiments.blind.cases import case, found_by_group, inclusions
+from tunnel_lab.experiments.blind.answers import scored
+from tunnel_lab.experiments.blind.cases import ScoredAnswer, case, found_by_group, inclusions
 from tunnel_lab.experiments.blind.score_page import calibration_figure, confusion_figure
 from tunnel_lab.experiments.blind.set_score import BlindScore, smooth_calibration
+from tunnel_sim.vocabulary.errors import TunnelError
 
 THREE = ["coulomb_friction", "gravity_stiffness", "quadratic_damping"]
 
 
 def made(truth, said, *, inclusion=None, **more):
     answer = document(said) | ({} if inclusion is None else {"inclusion": inclusion})
-    return case("c", {"effects": truth, **more}, answer)
+    return case("c", {"effects": truth, **more}, scored(answer, "c.json"))
 
 
 CASES = (
@@ -52,10 +56,8 @@ def test_an_undecided_answer_states_no_set_and_may_cover_the_true_one():
     wrong, truth = "mains_hum", ["free_play"]
 
     def answered(*answers):
-        stated = [{"effect": effect, "probability": value} for effect, value in answers]
-        return case(
-            "c", {"effects": truth, "small": ["sensor_drift"]}, document([wrong]) | {"candidates": stated}
-        )
+        said = ScoredAnswer((wrong,), decision=decision(answers, Settings().answer))
+        return case("c", {"effects": truth, "small": ["sensor_drift"]}, said)
 
     decided = answered((wrong, 0.6), ("free_play + sensor_drift", 0.35), ("unknown", 0.05))
     undecided = answered((wrong, 0.45), ("free_play", 0.3), ("unknown", 0.25))
@@ -73,7 +75,7 @@ def test_kinds_go_up_to_four():
 
 
 def test_a_truth_of_the_first_edition_has_no_small_causes_and_an_even_clock():
-    one = case("c", {"effects": ["free_play"], "schema_version": 1}, document(["free_play"]))
+    one = case("c", {"effects": ["free_play"], "schema_version": 1}, told(["free_play"]))
     assert (one.small, one.stamps, one.time_scale, one.coloured) == ((), "even", 1.0, False)
 
 
@@ -85,14 +87,14 @@ def test_inclusions_leave_small_causes_out():
 
 @pytest.mark.parametrize("bad", [{"free_play": 1.5}, {"free_play": "x"}, [0.5]])
 def test_an_inclusion_that_is_not_a_probability_is_refused(bad):
-    with pytest.raises(ValueError, match="validation error"):
+    with pytest.raises(TunnelError, match="is not a diagnosis"):
         made(["free_play"], ["free_play"], inclusion=bad)
 
 
 @pytest.mark.parametrize("bad", [-0.1, 1.5, 1e300])
 def test_a_candidate_without_a_probability_is_refused(bad):
-    with pytest.raises(ValueError, match="validation error"):
-        stated(["free_play"], ["free_play"], bad)
+    with pytest.raises(TunnelError, match="is not a diagnosis"):
+        told(["free_play"], probability=bad)
 
 
 def drawn(shift, seed=1, campaigns=600):
@@ -123,10 +125,7 @@ def test_certain_and_wrong_is_the_whole_error():
 
 def stated(effect, said, probability):
     """A campaign of one effect, answered with a probability."""
-    answer = document(said) | {
-        "candidates": [{"effect": "+".join(said) or "none", "probability": probability}]
-    }
-    return case("c", {"effects": effect}, answer)
+    return case("c", {"effects": effect}, told(said, probability=probability))
 
 
 ANSWERED = tuple(

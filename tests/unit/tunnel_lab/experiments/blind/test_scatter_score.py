@@ -10,9 +10,11 @@ from diagnosis.findings.terms import SCATTERS
 from identification.statistics import Proportion
 from tests.unit.tunnel_lab.experiments.blind.test_set_score import TRUTH, document
 from tunnel_lab.experiments.blind import score_page as blind
+from tunnel_lab.experiments.blind.answers import scored
 from tunnel_lab.experiments.blind.cases import case, found_by_group, inclusions
 from tunnel_lab.experiments.blind.scatter_score import scatter_score
 from tunnel_lab.experiments.blind.set_score import BlindScore
+from tunnel_sim.vocabulary.errors import TunnelError
 
 SPEED = {"wind_speed": 0.003}
 THREE = {"wind_speed": 0.003, "spring_stiffness": 0.0005, "mechanical_damping": 0.01}
@@ -25,7 +27,8 @@ def width(value, low, high, *, shown=True):
 def spreads(said):
     """What an answer says of the scatter, by number."""
     effects = {number: name for name, number in SCATTERS.items()}
-    return {"spreads": [{"effect": effects[number], **one} for number, one in said.items()]}
+    rest = {"stated": None, "deviations": {}}
+    return {"spreads": [{"effect": effects[number], **one, **rest} for number, one in said.items()]}
 
 
 def made(effects, causes, *, widths=None, said=None, stated=None, form="normal", **more):
@@ -33,7 +36,8 @@ def made(effects, causes, *, widths=None, said=None, stated=None, form="normal",
     truth = {**TRUTH, "effects": effects, "scatter_form": form, **more}
     truth |= {} if widths is None else {"scatter": widths, "scatter_level": "large"}
     truth |= {} if stated is None else {"repeatability": stated}
-    return case("c", truth, document(causes) | ({} if said is None else {"repeatability": spreads(said)}))
+    answer = document(causes) | ({} if said is None else {"repeatability": spreads(said)})
+    return case("c", truth, scored(answer, "c.json"))
 
 
 CASES = (
@@ -98,7 +102,7 @@ def test_the_causes_are_counted_without_scatter():
     assert named.probability == 0.9
     assert named.covered
     answer = document([]) | {"inclusion": {"coulomb_friction": 0.2, "wind_speed_scatter": 0.9}}
-    assert inclusions([case("c", {**TRUTH, "effects": []}, answer)]) == [([0.2], [False])]
+    assert inclusions([case("c", {**TRUTH, "effects": []}, scored(answer, "c.json"))]) == [([0.2], [False])]
 
 
 def test_scatter_has_tables_and_figures_of_its_own():
@@ -124,14 +128,14 @@ def test_a_set_whose_runs_repeat_says_nothing_of_scatter():
     "said",
     [
         {"spreads": [{"effect": "wind_speed_scatter", "width": 0.003}]},
-        {"spreads": [{"effect": "wind_speed_scatter", **width(-1.0, 0.0, 1.0)}]},
-        {"spreads": [{"effect": "wind_speed_scatter", **width(0.1, 0.0, 1.0), "interval": [0.1]}]},
+        spreads({"wind_speed": width(-1.0, 0.0, 1.0)}),
+        spreads({"wind_speed": width(0.1, 0.0, 1.0) | {"interval": [0.1]}}),
         [1],
     ],
 )
 def test_a_malformed_scatter_is_refused(said):
-    with pytest.raises(ValueError, match="validation error"):
-        case("c", {**TRUTH, "effects": []}, document([]) | {"repeatability": said})
+    with pytest.raises(TunnelError, match="is not a diagnosis"):
+        scored(document([]) | {"repeatability": said}, "c.json")
 
 
 def test_where_no_width_is_asked_for_none_are_shown():

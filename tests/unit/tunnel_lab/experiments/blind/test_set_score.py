@@ -19,8 +19,10 @@ from diagnosis.where.described import Where
 from identification.show.quantity import Quantity
 from identification.statistics import Proportion
 from tunnel_lab.experiments.blind import score_page as blind
+from tunnel_lab.experiments.blind.answers import scored
 from tunnel_lab.experiments.blind.cases import case
 from tunnel_lab.experiments.blind.set_score import BlindScore, calibration
+from tunnel_sim.vocabulary.errors import TunnelError
 
 
 def document(causes, *, probability=0.9, closed=0.99, rivals=(), cn=(0.45, -0.12), std=(0.001, 0.001)):
@@ -35,6 +37,11 @@ def document(causes, *, probability=0.9, closed=0.99, rivals=(), cn=(0.45, -0.12
         NoiseSummary(5e-4, None, "estimated", ""),
         decision([(name, probability)], Settings().answer, Predictions(held_out=closed)),
     ).to_json_dict()  # fmt: skip
+
+
+def told(causes, **stated):
+    """The same as it is scored."""
+    return scored(document(causes, **stated), "c.json")
 
 
 TRUTH = {"cn_beta": 0.45, "cn_r": -0.12, "severity": 4.0}
@@ -55,7 +62,7 @@ SAID = [  # truth, answer, probability
 @pytest.fixture
 def score():
     cases = tuple(
-        case(f"c{i}", {**TRUTH, "effects": truth}, document(said, probability=p))
+        case(f"c{i}", {**TRUTH, "effects": truth}, told(said, probability=p))
         for i, (truth, said, p) in enumerate(SAID)
     )
     return BlindScore(cases, (), "k", "a", {}, True)
@@ -109,7 +116,7 @@ def test_wilsons_interval_is_the_published_one():
 
 def test_errors_of_coefficients_are_in_standard_deviations():
     said = document(["free_play"], cn=(0.4525, -0.124), std=(0.001, 0.001))
-    one = case("c", {**TRUTH, "effects": ["free_play"]}, said)
+    one = case("c", {**TRUTH, "effects": ["free_play"]}, scored(said, "c.json"))
     beta, rate = one.error("cn_beta", "after"), one.error("cn_r", "before")
     assert (beta.stds, beta.share) == pytest.approx((2.5, 0.0025 / 0.45))
     assert (rate.stds, rate.share) == pytest.approx((-4.0, -0.004 / 0.12))
@@ -117,7 +124,8 @@ def test_errors_of_coefficients_are_in_standard_deviations():
     assert found["named rightly", "cn_beta", "after"].covered == Proportion(0, 1)
     assert found["named rightly", "cn_beta", "after"].spread == pytest.approx(2.5)
     said["coefficients"]["after"]["cn_beta"]["interval"] = [0.4499, 0.46]
-    assert case("c", {**TRUTH, "effects": ["free_play"]}, said).error("cn_beta", "after").covered
+    one = case("c", {**TRUTH, "effects": ["free_play"]}, scored(said, "c.json"))
+    assert one.error("cn_beta", "after").covered
 
 
 @pytest.mark.parametrize(("named", "cn_r"), [([], -0.21), (["unsteady_aero_lag"], -0.12)])
@@ -129,15 +137,15 @@ def test_without_a_named_lag_the_truth_is_the_derivative_in_phase(named, cn_r):
         "small": ["unsteady_aero_lag"],
         "in_phase": {"cn_beta": 0.449, "cn_r": -0.21},
     }
-    one = case("c", truth, document(named, cn=(0.45, cn_r), std=(0.001, 0.001)))
+    one = case("c", truth, told(named, cn=(0.45, cn_r), std=(0.001, 0.001)))
     assert one.error("cn_r", "after").stds == pytest.approx(0.0)
 
 
 def test_a_rival_is_named_where_the_truth_is_among_those_not_distinguished():
     truth = {**TRUTH, "effects": ["free_play"]}
-    assert case("c", truth, document(["cubic_stiffness"], rivals=["free_play"])).rival
-    assert not case("c", truth, document(["cubic_stiffness"], rivals=["buffeting"])).rival
-    assert not case("c", truth, document(["free_play"])).rival
+    assert case("c", truth, told(["cubic_stiffness"], rivals=["free_play"])).rival
+    assert not case("c", truth, told(["cubic_stiffness"], rivals=["buffeting"])).rival
+    assert not case("c", truth, told(["free_play"])).rival
 
 
 def test_the_page_holds_every_figure_and_no_empty_cell_of_the_matrix(score):
@@ -161,7 +169,8 @@ def test_times_are_on_the_page_where_they_are_known(score):
     title = "Seconds for each campaign"
     assert title not in [section.title for section in blind.sections(score)]
     timed = tuple(
-        case(f"c{i}", {**TRUTH, "effects": []}, document([]) | {"wall_s": float(i)}) for i in range(1, 12)
+        case(f"c{i}", {**TRUTH, "effects": []}, scored(document([]) | {"wall_s": float(i)}, ""))
+        for i in range(1, 12)
     )
     (found,) = [s for s in blind.sections(BlindScore(timed, (), "", "", {}, False)) if s.title == title]
     assert found.rows == (("6.0", "10.0", "11.0"),)
@@ -188,15 +197,15 @@ def test_answers_are_listed_by_truth_with_what_was_answered_otherwise(score):
 def test_an_answer_of_another_kind_is_refused_where_it_is_read(key, value):
     good = document(["free_play"])
     spoilt = {name: one for name, one in good.items() if name != key} | ({} if value is ... else {key: value})
-    case("c", {**TRUTH, "effects": ["free_play"]}, good)
-    with pytest.raises(ValueError, match="validation error"):
-        case("c", {**TRUTH, "effects": ["free_play"]}, spoilt)
+    said = scored(good, "c.json")
+    with pytest.raises(TunnelError, match=r"c\.json: is not a"):
+        scored(spoilt, "c.json")
     for truth in ({}, {"effects": 1}, {"effects": ["x"], "severity": "y"}, {"effects": [], "cn_r": []}):
         with pytest.raises(ValueError, match="validation error"):
-            case("c", truth, good)
+            case("c", truth, said)
 
 
 @pytest.mark.parametrize("bad", [0, "x", [], {"settings": 0}, {"settings": {"answer.decided_from": "x"}}])
 def test_a_provenance_that_is_none_is_refused(bad):
-    with pytest.raises(ValueError, match="validation error"):
-        case("c", {"effects": []}, document([]) | {"provenance": bad})
+    with pytest.raises(TunnelError, match=r"is not a diagnosis|was made with"):
+        scored(document([]) | {"provenance": bad}, "c.json")
