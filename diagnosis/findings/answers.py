@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from diagnosis.findings.candidates import Candidate
-from diagnosis.findings.finding import Judged
+from diagnosis.findings.finding import Judged, Picture
 from diagnosis.findings.repeatability import RunRepeatability
 from diagnosis.findings.terms import answer_name, scattering
 from identification.show.blocks import TextTable
@@ -120,6 +121,17 @@ SHOWN = 8
 
 
 _LABEL = 24  # characters in a line of a label
+
+
+def candidates_picture(candidates: Sequence[Candidate]) -> Picture:
+    """The likely answers."""
+    return Picture(
+        "which",
+        "Probability of the likely answers. The possible answers are: no gap, every fitted set of effects, and "
+        "unknown.",
+        "Bars: probability of each answer.",
+        partial(candidates_figure, candidates),
+    )
 
 
 @styled

@@ -6,7 +6,7 @@ shows all of them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Final
 
 from diagnosis.findings.answers import candidates_table, inclusion_line, parameters_table
@@ -62,7 +62,7 @@ def sections(answer: Findings, campaign: Campaign | None = None) -> tuple[Sectio
         _causes(answer),
         _place(answer),
         _closes(answer),
-        Section("fit", "The fit over the data", (captioned("fit"),)),
+        Section("fit", "The fit over the data", pictured(answer, "fit")),
         _repeats(answer),
         _how_far(answer, campaign),
         _closable(answer),
@@ -121,7 +121,7 @@ def _which(answer: Findings) -> Section:
         "which",
         "Which effect causes it",
         (
-            captioned("which"),
+            *pictured(answer, "which"),
             candidates_table(answer.candidates, answer.repeated, answer),
             Paragraph(inclusion_line(answer.inclusion, EFFECT_LISTED)),
             *(Paragraph(line) for line in rival_lines(answer)),
@@ -321,18 +321,6 @@ def diagnosis_brief(answer: Findings) -> str:
         f"  gap {size}{closed}\n"
         "  print() shows all; .plot(), .write_report(path), .to_frame()"
     )
-
-
-CAPTIONS: Mapping[str, str] = {
-    "fit": "The cycles in which the models, fitted to all runs, differ most. Below: measured minus model.",
-    "which": "Probability of the likely answers. The possible answers are: no gap, every fitted set of effects, "
-    "and unknown.",
-}
-
-
-def captioned(name: str) -> Figure:
-    """A figure with its caption."""
-    return Figure(name, CAPTIONS[name])
 
 
 def pictured(answer: Findings, *names: str) -> tuple[Figure, ...]:

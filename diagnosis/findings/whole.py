@@ -11,12 +11,14 @@ from typing import Annotated, Any, Self, cast, get_args, get_type_hints
 from pydantic import TypeAdapter
 
 from diagnosis.answer.held_out import Waterfall
+from diagnosis.findings.answers import candidates_picture
 from diagnosis.findings.candidates import Candidate, CauseSize
 from diagnosis.findings.causes import NamedCauses
 from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary, closure_pictures
 from diagnosis.findings.coefficients import Coefficients
 from diagnosis.findings.decision import Decision
 from diagnosis.findings.finding import Answered, Finding, Picture, Pictured
+from diagnosis.findings.fit_view import fit_picture
 from diagnosis.findings.friction_curve import FrictionCurve
 from diagnosis.findings.hidden import Hidden
 from diagnosis.findings.input_hold import OtherHold
@@ -166,18 +168,17 @@ class Findings:
 
     @property
     def pictures(self) -> dict[str, Picture]:
-        """The figures of the findings, by name."""
+        """The figures of the findings by name, in the order of the report."""
         pictured = [one for one in vars(self).values() if isinstance(one, Pictured)]
-        drawn = [drawn for one in pictured for drawn in one.pictures(self)]
-        return {
-            one.name: one
-            for one in (
-                *drawn,
-                *place_pictures(self.where, self.maps, self),
-                *closure_pictures(self.gap, self.waterfall, self.maps, self),
-                *law_pictures(self.closable),
-            )
-        }
+        drawn = (
+            *(drawn for one in pictured for drawn in one.pictures(self)),
+            *([fit_picture(self.maps)] if self.maps else []),
+            candidates_picture(self.candidates),
+            *place_pictures(self.where, self.maps, self),
+            *closure_pictures(self.gap, self.waterfall, self.maps, self),
+            *law_pictures(self.closable),
+        )
+        return {one.name: one for one in sorted(drawn, key=_place_of)}
 
     @property
     def settings(self) -> Settings:
@@ -316,6 +317,16 @@ class Findings:
             what = f"was made with {one_line(min(gone), 60)!r}, which is not a setting of this version"
             raise TunnelError(what, where=where, remedy=remedy)
         return found
+
+
+def _place_of(picture: Picture) -> int:
+    """The place of a figure in the order of the report; last for a figure that has none of its own."""
+    return next((i for i, first in enumerate(_FIGURES) if picture.name.startswith(first)), len(_FIGURES))
+
+
+_FIGURES = (
+    "fit", "waterfall", "coefficients", "place", "where", "which", "friction", "repeatability", "how-far", "law",
+)  # fmt: skip
 
 
 def _unknown_keys(data: Any, known: Any) -> Iterator[str]:

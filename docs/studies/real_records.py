@@ -15,7 +15,6 @@ from diagnosis import diagnose
 from diagnosis.result import Diagnosis
 from identification.datasets import MEASURED_CAMPAIGNS, measured_campaign
 from identification.show.style import save
-from tunnel_lab.report.figures import diagnosis_figure
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -115,8 +114,8 @@ def section(name: str, answer: Diagnosis | str, images: Path) -> tuple[str, str]
         std = "" if given.std is None else f" ± {given.std:.1g}"
         unit = "" if given.unit == "1" else f" {given.unit}"
         parts.append(f"- `{key}`: {given.value:.4g}{std}{unit}")
-    figure = diagnosis_figure(answer, "waterfall")
-    if figure is not None:
+    picture = answer.pictures.get("waterfall")
+    if picture is not None and (figure := picture.draw()) is not None:
         path = images / f"real-records-{name}.png"
         save(figure, path)
         parts.append(f"\n![The gap of {name} as the causes are added](images/{path.name})")

@@ -28,10 +28,6 @@ def inclusion_line(answer: Findings) -> str:
     return answers.inclusion_line(answer.inclusion, EFFECT_LISTED)
 
 
-def candidates_figure(answer: Findings) -> Figure | None:
-    return answers.candidates_figure(answer.candidates)
-
-
 def symbol_rows(answer: Findings) -> list[tuple[str, str]]:
     stated = {**answer.coefficients.before, **answer.coefficients.after}
     return symbols.symbol_rows(answer.causes, stated, answer.candidates[0].parameters)
@@ -135,6 +131,7 @@ def drawn(name: str) -> Callable[[Findings], Figure | None]:
     return draw
 
 
+candidates_figure = drawn("which")
 waterfall_figure, closure_figure, law_figure = drawn("waterfall"), drawn("how-far"), drawn("law")
 coefficients_figure, friction_figure = drawn("coefficients"), drawn("friction")
 repeatability_figure, runs_figure, profiles_figure = (

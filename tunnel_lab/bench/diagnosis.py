@@ -33,7 +33,6 @@ from tunnel_lab.bench.parts import (
     show_items,
 )
 from tunnel_lab.bench.workspace import DIAGNOSIS, Session, is_current, read_diagnosis
-from tunnel_lab.report.figures import diagnosis_figure
 from tunnel_lab.terminal.progress import STEPS
 from tunnel_lab.terminal.time_left import Reached
 from tunnel_sim.files.reading import read_json
@@ -233,23 +232,15 @@ class ShownAnswer:
         """The figures of the report's first page."""
 
         def drawings() -> list[str]:
-            from diagnosis.findings.place_figures import runs_figure
             from identification.show.drawing import inline_svg
-            from tunnel_lab.report.page import descriptions
 
-            drawn = {"waterfall": diagnosis_figure(answer, "waterfall")}
-            if not answer.repeated.repeats(answer):
-                drawn |= {
-                    name: answer.pictures[name].draw()
-                    for name in ["repeatability"]
-                    if name in answer.pictures
-                }
-            if answer.maps:
-                drawn["where-runs"] = runs_figure(answer.maps)
-            own = [drawing for one in answer.findings.values() for drawing in one.pictures(answer)]
-            drawn |= {drawing.name: drawing.draw() for drawing in own}
-            described = descriptions(answer)
-            return [inline_svg(fig, name, described[name]) for name, fig in drawn.items() if fig is not None]
+            chosen = ["waterfall", "repeatability", "where-runs"]
+            if answer.repeated.repeats(answer):
+                chosen.remove("repeatability")
+            chosen += [one.name for finding in answer.findings.values() for one in finding.pictures(answer)]
+            pictures = [answer.pictures[name] for name in chosen if name in answer.pictures]
+            drawn = [(one, one.draw()) for one in pictures]
+            return [inline_svg(fig, one.name, one.description) for one, fig in drawn if fig is not None]
 
         figures = await asyncio.to_thread(drawings)
         if self._figures.is_deleted:

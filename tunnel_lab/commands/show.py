@@ -105,15 +105,15 @@ def _of_diagnosis(file: Path, names: tuple[str, ...], runs: tuple[str, ...]) -> 
     Raises:
         TunnelError: for an unknown figure or run, or a diagnosis without curves.
     """
+    from diagnosis.findings.fit_view import fit_pages
     from tunnel_lab.report import draw
-    from tunnel_lab.report.charts import fit_pages
     from tunnel_lab.report.diagnosis_file import read_diagnosis
 
     answer, drawn = read_diagnosis(file), dict[str, "Figure"]()
     where, again = shown(file), "diagnose the campaign again"
     with as_described("cannot be drawn", where, again):
         if not names or "fit" in names:
-            pages = fit_pages(answer, runs)
+            pages = fit_pages(answer.maps, runs)
             if not pages:
                 raise TunnelError("has no curves to draw", where=where, remedy=again)
             drawn = {f"fit-{number}": page for number, page in enumerate(pages, 1)}

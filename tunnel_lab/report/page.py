@@ -16,13 +16,13 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from diagnosis.findings.sections import captioned, sections
+from diagnosis.findings.fit_view import fit_figure
+from diagnosis.findings.sections import pictured, sections
 from diagnosis.findings.verdict import headline
 from diagnosis.findings.whole import Findings
 from identification.show.blocks import Paragraph, as_html
 from identification.show.drawing import inline_svg, shown_text
-from tunnel_lab.report.charts import Chart, charts, fit_charts, fit_figure
-from tunnel_lab.report.figures import diagnosis_figure, diagnosis_figures
+from tunnel_lab.report.charts import Chart, charts, fit_charts
 from tunnel_sim.files.writing import write_encoded, write_whole
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -31,11 +31,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
 
-DESCRIPTIONS = {
-    "fit": "The measured and predicted readings of both models against time, and below them the residuals.",
-    "which": "Bars: probability of each answer.",
-}
-"""Text alternatives of the figures."""
 FAMILY = "DejaVu Sans"
 """matplotlib places the text of a figure by the widths of this font, which it ships."""
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
@@ -75,7 +70,7 @@ def render_report(answer: Findings, campaign: Campaign, byline: Byline | None = 
     from markupsafe import Markup
 
     byline, (words, kind) = byline or Byline(), headline(answer)
-    page = _page(answer, diagnosis_figures(answer), fit_charts(answer) | charts(answer))
+    page = _page(answer, diagnosis_figures(answer), fit_charts(answer.maps) | charts(answer.maps))
     drawn, parts = page.pop("drawn"), {}
     for section in sections(answer, campaign):
         blocks = section.blocks
@@ -110,9 +105,9 @@ def render_fit(answer: Findings) -> str:
     """The fit over the data as a separate HTML page; without a chart where the document has no ``maps``."""
     from markupsafe import Markup
 
-    drawing = fit_figure(answer)
-    page = _page(answer, {} if drawing is None else {"fit": drawing}, fit_charts(answer))
-    fit = Markup(as_html((captioned("fit"),), page.pop("drawn")))
+    drawing = fit_figure(answer.maps)
+    page = _page(answer, {} if drawing is None else {"fit": drawing}, fit_charts(answer.maps))
+    fit = Markup(as_html(pictured(answer, "fit"), page.pop("drawn")))
     return _rendered("fit.html.j2", {"campaign": answer.campaign, "fit": fit} | page)
 
 
@@ -120,13 +115,16 @@ def draw(answer: Findings, what: str, runs: Sequence[str] = ()) -> Drawing:
     """One figure of the report.
 
     Args:
-        what: name of the figure, as in `DESCRIPTIONS`.
+        what: name of the figure, as in `Findings.pictures`.
         runs: ids of the runs for ``fit``; two of them are drawn. Empty: those with the largest gap.
 
     Raises:
         TunnelError: for a figure or a run that the diagnosis does not have.
     """
-    drawn = fit_figure(answer, runs) if what == "fit" else diagnosis_figure(answer, what)
+    if what == "fit":
+        drawn = fit_figure(answer.maps, runs)
+    else:
+        drawn = answer.pictures[what].draw() if what in answer.pictures else None
     if drawn is None:
         known = ", ".join(diagnosis_figures(answer))
         raise TunnelError(f"the diagnosis has no figure {what!r}", remedy=f"choose of its figures: {known}")
@@ -159,18 +157,18 @@ def _resource(name: str) -> str:
     return resources.files("tunnel_lab.report").joinpath(*name.split("/")).read_text("utf-8")
 
 
-def descriptions(answer: Findings) -> Mapping[str, str]:
-    """Text alternatives of the figures of a diagnosis, by name."""
-    return DESCRIPTIONS | {name: drawn.description for name, drawn in answer.pictures.items()}
+def diagnosis_figures(answer: Findings) -> dict[str, Drawing]:
+    """All figures of a diagnosis by name, in the order of the report; those of ``maps`` only where present."""
+    return {name: drawn for name, one in answer.pictures.items() if (drawn := one.draw()) is not None}
 
 
 def _page(answer: Findings, drawings: Mapping[str, Drawing], shown: dict[str, list[Chart]]) -> dict[str, Any]:
     """The figures as HTML, styles and scripts: text included in the page unchanged."""
     from markupsafe import Markup
 
-    drawn, described = {}, descriptions(answer)
+    drawn, pictures = {}, answer.pictures
     for name, figure in drawings.items():
-        text = described[name]
+        text = pictures[name].description
         chart = '<div class="charts"></div>' if name in shown else ""
         drawn[name] = f'{chart}<div class="drawn" tabindex="0">{inline_svg(figure, name, text)}</div>'
     font = font_face(shown_text("".join(drawn.values())))

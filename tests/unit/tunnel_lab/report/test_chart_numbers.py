@@ -21,7 +21,7 @@ Document = dict[str, Any]
 def test_the_spectrum_of_all_runs_and_of_each(given: Document) -> None:
     spectrum = given["maps"]["frequency"]
     spectrum["by_run"] = [[2.25, None, 0.5], [-0.5, 0.0, 1.0], [None, 3.0, -0.95]]
-    (chart,) = charts(findings_of(given))["where-spectrum"]
+    (chart,) = charts(findings_of(given).maps)["where-spectrum"]
     centres = [0.7071, 2.0, 8.0]  # Hz, √(0.5 · 1), √(1 · 4), √(4 · 16)
     whole, *each = chart["views"]
     assert [view["run"] for view in each] == list(IDS)
@@ -50,7 +50,7 @@ def test_bins_without_a_record_are_left_out(given: Document) -> None:
     spectrum["excess"][0], spectrum["after"] = None, None
     spectrum["std"] = [None, 0.052, 0.4]
     spectrum["by_run"] = [[None, 1.0, 2.0]] * 3
-    (chart,) = charts(findings_of(given))["where-spectrum"]
+    (chart,) = charts(findings_of(given).maps)["where-spectrum"]
     frequency, _, _, before, after = chart["views"][0]["data"]
     assert frequency == pytest.approx([2.0, 8.0])
     assert (before, after) == ([81.0, 0.3], [None, None])
@@ -58,7 +58,7 @@ def test_bins_without_a_record_are_left_out(given: Document) -> None:
 
 
 def test_the_cells_of_runs_over_time(given: Document) -> None:
-    (chart,) = charts(findings_of(given))["where-runs"]
+    (chart,) = charts(findings_of(given).maps)["where-runs"]
     floor = 3.0 * 0.017 * np.sqrt(3.0)  # three deviations of a cell, of which there are three to a run
     assert chart["values"] == [[60.0, 21.0, None], [9.0, None, 1.5], [2.0, 0.5, None]]
     assert chart["range"] == pytest.approx([floor, 60.0])
@@ -68,7 +68,7 @@ def test_the_cells_of_runs_over_time(given: Document) -> None:
 
 
 def test_the_cells_of_the_missing_moment(given: Document) -> None:
-    (chart,) = charts(findings_of(given))["where-phase-plane"]
+    (chart,) = charts(findings_of(given).maps)["where-phase-plane"]
     assert chart["values"] == [[12.0, -25.0], [None, None]]  # the last is within three deviations
     assert chart["unit"] == "10⁻³ N m"
     reach = 1e3 * float(np.quantile([0.012, 0.025, 0.001], 0.98))
@@ -76,8 +76,8 @@ def test_the_cells_of_the_missing_moment(given: Document) -> None:
     edges = np.degrees(given["maps"]["phase_plane"]["edges_rad"]).tolist()
     assert chart["x"]["edges"] == chart["y"]["edges"] == edges
     given["maps"]["phase_plane"] = None
-    assert "where-phase-plane" not in charts(findings_of(given))
+    assert "where-phase-plane" not in charts(findings_of(given).maps)
 
 
 def test_no_maps_no_charts(given: Document) -> None:
-    assert charts(findings_of(given | {"maps": None})) == {}
+    assert charts(findings_of(given | {"maps": None}).maps) == {}

@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from diagnosis.compose import localise
+from diagnosis.findings.fit_view import fit_figure, fit_pages
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
 from tests.support.diagnosis_document import findings_of
 from tests.support.gap_campaigns import campaign, nominal, studied
-from tunnel_lab.report.charts import fit_charts, fit_figure, fit_pages
+from tunnel_lab.report.charts import fit_charts
 from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -24,7 +25,7 @@ CAUSE = "quadratic_damping"
 
 
 def test_the_charts_hold_the_readings_the_models_and_the_residuals_of_every_run(given: Document) -> None:
-    fits, residuals = fit_charts(findings_of(given))["fit"]
+    fits, residuals = fit_charts(findings_of(given).maps)["fit"]
     assert [one["label"] for one in fits["series"]] == ["measured", "model", "model with the causes"]
     assert [one["label"] for one in residuals["series"]] == ["model", "model with the causes"]
     for over, below, trace in zip(fits["views"], residuals["views"], given["maps"]["traces"], strict=True):
@@ -49,7 +50,7 @@ def test_the_charts_hold_the_readings_the_models_and_the_residuals_of_every_run(
 
 
 def test_the_figure_draws_the_cycles_where_the_models_differ_most(given: Document) -> None:
-    fig = fit_figure(findings_of(given))
+    fig = fit_figure(findings_of(given).maps)
     assert fig is not None
     for column, trace in enumerate(given["maps"]["traces"]):
         whole, near, left = (fig.axes[2 * row + column] for row in range(3))
@@ -70,27 +71,27 @@ def test_the_figure_draws_the_cycles_where_the_models_differ_most(given: Documen
 
 
 def test_any_run_can_be_chosen_and_another_is_refused(given: Document) -> None:
-    fig = fit_figure(findings_of(given), ["gamma"])
+    fig = fit_figure(findings_of(given).maps, ["gamma"])
     assert fig is not None
     assert len(fig.axes) == 3
     assert "gamma" in fig.axes[0].get_title(loc="left")
     with pytest.raises(TunnelError, match=r"no run 'delta'.*alpha, gamma"):
-        fit_figure(findings_of(given), ["delta"])
+        fit_figure(findings_of(given).maps, ["delta"])
     given["maps"]["traces"] *= 2
     for name, trace in zip("abcd", given["maps"]["traces"], strict=True):
         given["maps"]["traces"]["abcd".index(name)] = trace | {"id": name}
-    assert [len(page.axes) for page in fit_pages(findings_of(given))] == [6, 6]
+    assert [len(page.axes) for page in fit_pages(findings_of(given).maps)] == [6, 6]
 
 
 @pytest.mark.parametrize(("unit", "shown"), [("rad", "°"), ("rad/s", "°/s"), ("rad/s2", "°/s²")])
 def test_the_unit_is_that_of_the_readings(given: Document, unit: str, shown: str) -> None:
     given["maps"]["unit"] = unit
-    assert fit_charts(findings_of(given))["fit"][0]["y"]["label"] == f"reading [{shown}]"
+    assert fit_charts(findings_of(given).maps)["fit"][0]["y"]["label"] == f"reading [{shown}]"
 
 
 def test_no_maps_no_fit(given: Document) -> None:
-    assert fit_figure(findings_of(given | {"maps": None})) is None
-    assert fit_charts(findings_of(given | {"maps": None})) == {}
+    assert fit_figure(findings_of(given | {"maps": None}).maps) is None
+    assert fit_charts(findings_of(given | {"maps": None}).maps) == {}
 
 
 def test_the_document_holds_the_records_and_the_cycles_where_the_models_differ() -> None:

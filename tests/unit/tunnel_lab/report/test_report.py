@@ -28,8 +28,7 @@ from tests.support.diagnosis_document import findings_of, scattering_document
 from tests.support.gap_campaigns import campaign, nominal, studied
 from tests.support.rendered import waterfall_figure
 from tunnel_lab.report import Byline, render_report, write_pdf, write_report
-from tunnel_lab.report.figures import diagnosis_figures
-from tunnel_lab.report.page import descriptions
+from tunnel_lab.report.page import diagnosis_figures
 from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -107,9 +106,7 @@ def page(document, data):
 @pytest.fixture
 def written(monkeypatch, data):
     """Renders a page with empty figures: they take nearly all of the time, and are in ``page``."""
-    monkeypatch.setattr(
-        "tunnel_lab.report.page.diagnosis_figures", lambda one: dict.fromkeys(descriptions(one))
-    )
+    monkeypatch.setattr("tunnel_lab.report.page.diagnosis_figures", lambda one: dict.fromkeys(one.pictures))
     monkeypatch.setattr("tunnel_lab.report.page.inline_svg", lambda *_: "")
     return lambda document, *byline: render_report(findings_of(document), data, *byline)
 
@@ -204,7 +201,7 @@ def test_text_of_the_campaign_cannot_become_markup(page, document, written):
 
 def test_figures_have_words_for_those_who_cannot_see_them(document, page):
     pictures = [attrs for tag, attrs in Page(page).tags if tag == "svg"]
-    words = descriptions(findings_of(document))
+    words = {name: one.description for name, one in findings_of(document).pictures.items()}
     assert sorted(attrs["aria-label"] for attrs in pictures) == sorted(words.values())
     assert all(attrs["role"] == "img" for attrs in pictures)
     assert page.count("<figcaption>") == len(pictures)
@@ -305,7 +302,7 @@ def test_every_figure_is_described(document):
     without_maps = diagnosis_figures(findings_of(document | {"maps": None, "repeatability": None}))
     assert list(without_maps) == ["waterfall", "coefficients", "which", "how-far", "law"]
     answer = findings_of(document)
-    assert set(diagnosis_figures(answer)) == set(descriptions(answer))
+    assert set(diagnosis_figures(answer)) == set(answer.pictures)
 
 
 def test_how_the_runs_repeat_is_a_section_or_one_line(document, written):
