@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from identification.examination.examine import measured
-from identification.examination.slips.statements import InertiaOffTheSprings, SpringOffTheLine
+from identification.examination.slips.compared_labels import InertiaOffTheSprings, SpringOffTheLine
 from identification.examination.slips.table import RECORD_SLIPS, STATEMENT_SLIPS
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.campaign import Campaign

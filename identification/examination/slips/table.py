@@ -5,6 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from identification.examination.slips.base import RecordSlip, SlipEvidence, StatementSlip
+from identification.examination.slips.compared_labels import (
+    InertiaOffTheSprings,
+    LabelsExchanged,
+    SpringOffTheLine,
+    SpringsRenumbered,
+)
 from identification.examination.slips.factors import WrongFactor
 from identification.examination.slips.instruments import CoupledSensor, DriftingClock
 from identification.examination.slips.odd_sensors import (
@@ -26,12 +32,8 @@ from identification.examination.slips.spoilt_records import (
 )
 from identification.examination.slips.statements import (
     EqualStatementsDiffer,
-    InertiaOffTheSprings,
     InertiaOfNoBody,
-    LabelsExchanged,
     MotionGrows,
-    SpringOffTheLine,
-    SpringsRenumbered,
     WindExchanged,
     WindNotSeen,
     YawMomentTooLarge,
