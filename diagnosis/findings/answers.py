@@ -123,15 +123,16 @@ SHOWN = 8
 _LABEL = 24  # characters in a line of a label
 
 
-def candidates_picture(candidates: Sequence[Candidate]) -> Picture:
+def candidates_pictures(candidates: Sequence[Candidate]) -> tuple[Picture, ...]:
     """The likely answers."""
-    return Picture(
+    drawn = Picture(
         "which",
         "Probability of the likely answers. The possible answers are: no gap, every fitted set of effects, and "
         "unknown.",
         "Bars: probability of each answer.",
         partial(candidates_figure, candidates),
     )
+    return (drawn,)
 
 
 @styled

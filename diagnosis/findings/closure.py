@@ -260,24 +260,27 @@ WITHIN_THE_NOISE = "within the noise"
 """A residual gap that is not significant, in the words of the verdict."""
 
 
-def closure_pictures(
-    gap: GapSummary, waterfall: Waterfall, maps: Maps | None, judged: Judged
-) -> tuple[Picture, ...]:
-    """The residual gap as the causes are added, where some are, and run by run."""
-    by_cause = Picture(
+def waterfall_pictures(waterfall: Waterfall, maps: Maps | None, judged: Judged) -> tuple[Picture, ...]:
+    """The residual gap as the causes are added; none without causes."""
+    drawn = Picture(
         "waterfall",
         "What the model misses, as the causes are added one after another. Open circles: without this cause alone.",
         "The residual gap as the causes are added one after another.",
         partial(waterfall_figure, waterfall, maps, judged),
     )
-    by_run = Picture(
+    return (drawn,) if len(waterfall.steps) > 1 else ()
+
+
+def closure_pictures(gap: GapSummary, maps: Maps | None) -> tuple[Picture, ...]:
+    """The gap run by run."""
+    drawn = Picture(
         "how-far",
         "Misfit of every run before and after. Filled circles: the run was held out of the fit, and only its "
         "release was refitted. Open circles: the run was part of the fit.",
         "Misfit of every run with the nominal model and with the causes added.",
         partial(closure_figure, gap, maps),
     )
-    return (*([by_cause] if len(waterfall.steps) > 1 else []), by_run)
+    return (drawn,)
 
 
 @styled

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from diagnosis.findings.finding import Judged, Picture, Pictured
+from diagnosis.findings.finding import Judged, Picture
 from diagnosis.findings.hidden import Hidden
 from diagnosis.search.weigh import UNKNOWN
 from identification.printing import COEFFICIENTS, coefficient_label
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Coefficients(Pictured):
+class Coefficients:
     """Coefficients of the nominal model before and after the causes are added.
 
     Args:
@@ -62,9 +62,8 @@ class Coefficients(Pictured):
     note: str = ""
     correlation: tuple[tuple[float, ...], ...] = ()
 
-    def pictures(self, judged: Judged) -> tuple[Picture, ...]:
+    def pictures(self) -> tuple[Picture, ...]:
         """The coefficients that the runs determine, before and after; none without any."""
-        del judged
         description = "Coefficients before and after the causes are added, with 95 % intervals."
         drawn = Picture(
             "coefficients", "Estimates with 95 % intervals.", description, partial(coefficients_figure, self)

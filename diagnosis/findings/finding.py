@@ -61,15 +61,7 @@ class Picture:
         return Figure(self.name, self.caption)
 
 
-class Pictured:
-    """A value of a diagnosis with figures."""
-
-    def pictures(self, judged: Judged) -> tuple[Picture, ...]:
-        """Its figures."""
-        raise NotImplementedError
-
-
-class Finding(Pictured):
+class Finding:
     """A finding of a diagnosis with a section of its own."""
 
     #: Key of the section of a page after which its own stands.

@@ -92,19 +92,20 @@ def fit_pages(maps: Maps | None, ids: Sequence[str] = ()) -> list[Figure]:
     return [_drawn(runs[first : first + _COLUMNS]) for first in range(0, len(runs), _COLUMNS)]
 
 
-def fit_picture(maps: Maps) -> Picture:
-    """The fit over the data, without the whole records."""
+def fit_pictures(maps: Maps | None) -> tuple[Picture, ...]:
+    """The fit over the data, without the whole records; none without ``maps``."""
 
     def draw() -> Figure | None:
         runs = fitted_runs(maps)[:_COLUMNS]
         return _drawn(runs, _LOW, whole=False) if runs else None
 
-    return Picture(
+    drawn = Picture(
         "fit",
         "The cycles in which the models, fitted to all runs, differ most. Below: measured minus model.",
         "The measured and predicted readings of both models against time, and below them the residuals.",
         draw,
     )
+    return (drawn,) if maps else ()
 
 
 @styled

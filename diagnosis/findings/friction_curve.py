@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.findings.finding import Judged, Picture, Pictured
+from diagnosis.findings.finding import Picture
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.model.similarity import Similarity
 from identification.show.drawing import AFTER, INK, NARROW, PAPER
@@ -47,7 +47,7 @@ class FrictionPoint:
 
 
 @dataclass(frozen=True)
-class FrictionCurve(Pictured):
+class FrictionCurve:
     """The friction of an effect against the rate.
 
     Args:
@@ -72,9 +72,8 @@ class FrictionCurve(Pictured):
         """The fields, in JSON's types."""
         return {name: as_json(value) for name, value in vars(self).items()}
 
-    def pictures(self, judged: Judged) -> tuple[Picture, ...]:
+    def pictures(self) -> tuple[Picture, ...]:
         """Friction against rate."""
-        del judged
         caption = (
             "Friction against rate, with 95 % intervals. Line: the law of the answer, with the band of its fit. "
             "Circles: energy lost between reversals of the motion, less the dissipation by the other terms of the "

@@ -227,9 +227,9 @@ def lines_table(maps: Maps | None, unit: str) -> TextTable:
     return TextTable("Narrow lines in the residuals", heads, rows, right=heads[1:])
 
 
-def place_pictures(where: Where, maps: Maps | None, judged: Judged) -> tuple[Picture, ...]:
-    """The place of the gap in the data of the figures; none without data, and no map without a gap."""
-    if maps is None:
+def place_pictures(maps: Maps | None, judged: Judged) -> tuple[Picture, ...]:
+    """The map of the gap; none without data or a gap."""
+    if maps is None or not judged.causes:
         return ()
     axis = "time" if maps.grid.wind_speeds is None else "the wind speed"
     place = Picture(
@@ -239,8 +239,14 @@ def place_pictures(where: Where, maps: Maps | None, judged: Judged) -> tuple[Pic
         "Map of the misfit of the nominal model by amplitude and wind speed, or by amplitude and time.",
         partial(place_figure, maps.grid, judged.misfit),
     )
+    return (place,)
+
+
+def where_pictures(where: Where, maps: Maps | None) -> tuple[Picture, ...]:
+    """The place of the gap in the data of the figures; none without data."""
+    if maps is None:
+        return ()
     return (
-        *([place] if judged.causes else []),
         Picture(
             "where-runs",
             "Excess of every run over time: the mean squared residual of the nominal model over the noise "

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from diagnosis.answer.run_deviations import RunDeviations, RunRepeat, ScatterLimits, Spread, Trend
-from diagnosis.findings.finding import Judged, NextStep, Picture, Pictured
+from diagnosis.findings.finding import Judged, NextStep, Picture
 from diagnosis.findings.terms import NUMBERS, SCATTERS, scattering, without_scatter
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.search.weigh import UNKNOWN
@@ -64,7 +64,7 @@ class AnswerWithout:
 
 
 @dataclass(frozen=True)
-class RunRepeatability(Pictured):
+class RunRepeatability:
     """Repeatability of the runs under the answer.
 
     Args:
@@ -270,9 +270,8 @@ class RunRepeatability(Pictured):
             title += ", and its scatter by chance (one standard deviation)"
         return TextTable(title, heads[:last], tuple(row[:last] for row in rows), heads[2:4])
 
-    def pictures(self, judged: Judged) -> tuple[Picture, ...]:
+    def pictures(self) -> tuple[Picture, ...]:
         """Every run against the model; none for fewer than two runs."""
-        del judged
         caption = (
             "Repeatability: frequency and damping ratio of every run minus the prediction of the model of all "
             "runs. Bars: 95 % intervals of the noise. Grey: the 95 % band of the scatter between runs, which "

@@ -6,12 +6,20 @@ shows all of them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Final
 
-from diagnosis.findings.answers import candidates_table, inclusion_line, parameters_table
+from diagnosis.findings.answers import candidates_pictures, candidates_table, inclusion_line, parameters_table
 from diagnosis.findings.cards import cause_cards, effect_cards
-from diagnosis.findings.closure import model_line, noise_line, runs_table, tests_table, waterfall_table
+from diagnosis.findings.closure import (
+    closure_pictures,
+    model_line,
+    noise_line,
+    runs_table,
+    tests_table,
+    waterfall_pictures,
+    waterfall_table,
+)
 from diagnosis.findings.coefficients import (
     budget_table,
     coefficients_line,
@@ -19,11 +27,13 @@ from diagnosis.findings.coefficients import (
     hidden_line,
     hidden_table,
 )
+from diagnosis.findings.finding import Picture
+from diagnosis.findings.fit_view import fit_pictures
 from diagnosis.findings.head import Head
 from diagnosis.findings.next_steps import next_steps, rival_lines
 from diagnosis.findings.patch import patch_line, patch_table
-from diagnosis.findings.place import lines_table, place_rows
-from diagnosis.findings.remainder import closable_line, closable_table, formula_line
+from diagnosis.findings.place import lines_table, place_pictures, place_rows, where_pictures
+from diagnosis.findings.remainder import closable_line, closable_table, formula_line, law_pictures
 from diagnosis.findings.symbols import symbol_rows
 from diagnosis.findings.terms import named_answer
 from diagnosis.findings.whole import SCHEMA_VERSION, Findings
@@ -62,7 +72,7 @@ def sections(answer: Findings, campaign: Campaign | None = None) -> tuple[Sectio
         _causes(answer),
         _place(answer),
         _closes(answer),
-        Section("fit", "The fit over the data", pictured(answer, "fit")),
+        Section("fit", "The fit over the data", figures(fit_pictures(answer.maps))),
         _repeats(answer),
         _how_far(answer, campaign),
         _closable(answer),
@@ -98,21 +108,22 @@ def printed(answer: Findings) -> tuple[Block, ...]:
 
 
 def _place(answer: Findings) -> Section:
-    return Section("place", "Where the gap is", pictured(answer, "place"))
+    return Section("place", "Where the gap is", figures(place_pictures(answer.maps, answer)))
 
 
 def _closes(answer: Findings) -> Section:
-    return Section("closes", "How much of the gap is explained", pictured(answer, "waterfall"))
+    drawn = waterfall_pictures(answer.waterfall, answer.maps, answer)
+    return Section("closes", "How much of the gap is explained", figures(drawn))
 
 
 def _where(answer: Findings) -> Section:
-    figures = pictured(answer, *(name for name in answer.pictures if name.startswith("where-")))
+    drawn = figures(where_pictures(answer.where, answer.maps))
     place = (Detail((Pairs(place_rows(answer.where, answer)),)),) if answer.causes else ()
     words = Paragraph(answer.where.words, "Where")
     return Section(
         "where",
         "Where the model departs from the runs",
-        (words, *place, *figures, Detail((lines_table(answer.maps, answer.misfit.unit),))),
+        (words, *place, *drawn, Detail((lines_table(answer.maps, answer.misfit.unit),))),
     )
 
 
@@ -121,12 +132,12 @@ def _which(answer: Findings) -> Section:
         "which",
         "Which effect causes it",
         (
-            *pictured(answer, "which"),
+            *figures(candidates_pictures(answer.candidates)),
             candidates_table(answer.candidates, answer.repeated, answer),
             Paragraph(inclusion_line(answer.inclusion, EFFECT_LISTED)),
             *(Paragraph(line) for line in rival_lines(answer)),
             *effect_cards(answer),
-            *pictured(answer, "friction"),
+            *figures(answer.friction.pictures() if answer.friction else ()),
         ),
     )
 
@@ -145,12 +156,12 @@ def _causes(answer: Findings) -> Section:
 
 def _repeats(answer: Findings) -> Section:
     line = answer.repeated.line(answer)
-    drawn = [] if not line or answer.repeated.repeats(answer) else [*pictured(answer, "repeatability")]
+    drawn = () if not line or answer.repeated.repeats(answer) else figures(answer.repeated.pictures())
     return Section("repeats", "How the runs repeat", (Paragraph(line), *drawn, answer.repeated.table(answer)))
 
 
 def _how_far(answer: Findings, campaign: Campaign | None) -> Section:
-    (drawn,) = pictured(answer, "how-far")
+    drawn = figures(closure_pictures(answer.gap, answer.maps))
     meaning = (
         "A run shows the gap if its residual, with the nominal model fitted to all runs, exceeds chance at a "
         "false-alarm rate of 1 % per campaign and is at least a tenth of the largest residual of a run."
@@ -161,7 +172,7 @@ def _how_far(answer: Findings, campaign: Campaign | None) -> Section:
         "How much of the gap is explained, run by run",
         (
             waterfall_table(answer.waterfall, answer.misfit),
-            drawn,
+            *drawn,
             runs,
             Detail((Paragraph(meaning, kind="small"),)),
         ),
@@ -169,7 +180,7 @@ def _how_far(answer: Findings, campaign: Campaign | None) -> Section:
 
 
 def _closable(answer: Findings) -> Section:
-    drawn = pictured(answer, "law")
+    drawn = figures(law_pictures(answer.closable))
     return Section(
         "closable",
         "What could explain the residual gap",
@@ -216,7 +227,7 @@ def _uncertainty(answer: Findings, blown: bool) -> Section:
         "uncertainty",
         "Uncertainty of the coefficients",
         (
-            *pictured(answer, "coefficients"),
+            *figures(answer.coefficients.pictures()),
             Detail((budget_table(answer.coefficients),)),
             Paragraph(coefficients_line(answer.coefficients)),
             Paragraph(trade_off_line(answer.trade_off, COEFFICIENTS)),
@@ -323,6 +334,6 @@ def diagnosis_brief(answer: Findings) -> str:
     )
 
 
-def pictured(answer: Findings, *names: str) -> tuple[Figure, ...]:
-    """The figures of findings by their names, those that the answer has."""
-    return tuple(answer.pictures[name].block for name in names if name in answer.pictures)
+def figures(pictures: Iterable[Picture]) -> tuple[Figure, ...]:
+    """Pictures in a section."""
+    return tuple(one.block for one in pictures)

@@ -11,14 +11,20 @@ from typing import Annotated, Any, Self, cast, get_args, get_type_hints
 from pydantic import TypeAdapter
 
 from diagnosis.answer.held_out import Waterfall
-from diagnosis.findings.answers import candidates_picture
+from diagnosis.findings.answers import candidates_pictures
 from diagnosis.findings.candidates import Candidate, CauseSize
 from diagnosis.findings.causes import NamedCauses
-from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary, closure_pictures
+from diagnosis.findings.closure import (
+    Confirmation,
+    GapSummary,
+    NoiseSummary,
+    closure_pictures,
+    waterfall_pictures,
+)
 from diagnosis.findings.coefficients import Coefficients
 from diagnosis.findings.decision import Decision
-from diagnosis.findings.finding import Answered, Finding, Picture, Pictured
-from diagnosis.findings.fit_view import fit_picture
+from diagnosis.findings.finding import Answered, Finding, Picture
+from diagnosis.findings.fit_view import fit_pictures
 from diagnosis.findings.friction_curve import FrictionCurve
 from diagnosis.findings.hidden import Hidden
 from diagnosis.findings.input_hold import OtherHold
@@ -26,7 +32,7 @@ from diagnosis.findings.judgements import Nearly
 from diagnosis.findings.misfit import Misfit
 from diagnosis.findings.next_run import FurtherRuns, NextRun
 from diagnosis.findings.other_motions import TwoModes
-from diagnosis.findings.place import place_pictures
+from diagnosis.findings.place import place_pictures, where_pictures
 from diagnosis.findings.remainder import Remainder, law_pictures
 from diagnosis.findings.repeatability import RunRepeatability
 from diagnosis.findings.what_it_costs import WhatItCosts
@@ -169,16 +175,20 @@ class Findings:
     @property
     def pictures(self) -> dict[str, Picture]:
         """The figures of the findings by name, in the order of the report."""
-        pictured = [one for one in vars(self).values() if isinstance(one, Pictured)]
         drawn = (
-            *(drawn for one in pictured for drawn in one.pictures(self)),
-            *([fit_picture(self.maps)] if self.maps else []),
-            candidates_picture(self.candidates),
-            *place_pictures(self.where, self.maps, self),
-            *closure_pictures(self.gap, self.waterfall, self.maps, self),
+            *fit_pictures(self.maps),
+            *waterfall_pictures(self.waterfall, self.maps, self),
+            *self.coefficients.pictures(),
+            *place_pictures(self.maps, self),
+            *where_pictures(self.where, self.maps),
+            *candidates_pictures(self.candidates),
+            *(self.friction.pictures() if self.friction else ()),
+            *self.repeated.pictures(),
+            *closure_pictures(self.gap, self.maps),
             *law_pictures(self.closable),
+            *(one for finding in self.findings.values() for one in finding.pictures(self)),
         )
-        return {one.name: one for one in sorted(drawn, key=_place_of)}
+        return {one.name: one for one in drawn}
 
     @property
     def settings(self) -> Settings:
@@ -317,16 +327,6 @@ class Findings:
             what = f"was made with {one_line(min(gone), 60)!r}, which is not a setting of this version"
             raise TunnelError(what, where=where, remedy=remedy)
         return found
-
-
-def _place_of(picture: Picture) -> int:
-    """The place of a figure in the order of the report; last for a figure that has none of its own."""
-    return next((i for i, first in enumerate(_FIGURES) if picture.name.startswith(first)), len(_FIGURES))
-
-
-_FIGURES = (
-    "fit", "waterfall", "coefficients", "place", "where", "which", "friction", "repeatability", "how-far", "law",
-)  # fmt: skip
 
 
 def _unknown_keys(data: Any, known: Any) -> Iterator[str]:

@@ -16,8 +16,8 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from diagnosis.findings.fit_view import fit_figure
-from diagnosis.findings.sections import pictured, sections
+from diagnosis.findings.fit_view import fit_figure, fit_pictures
+from diagnosis.findings.sections import figures, sections
 from diagnosis.findings.verdict import headline
 from diagnosis.findings.whole import Findings
 from identification.show.blocks import Paragraph, as_html
@@ -107,7 +107,7 @@ def render_fit(answer: Findings) -> str:
 
     drawing = fit_figure(answer.maps)
     page = _page(answer, {} if drawing is None else {"fit": drawing}, fit_charts(answer.maps))
-    fit = Markup(as_html(pictured(answer, "fit"), page.pop("drawn")))
+    fit = Markup(as_html(figures(fit_pictures(answer.maps)), page.pop("drawn")))
     return _rendered("fit.html.j2", {"campaign": answer.campaign, "fit": fit} | page)
 
 
