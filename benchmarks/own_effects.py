@@ -16,6 +16,7 @@ from rich.table import Table
 
 from benchmarks.throughput import interleaved, row, stepping
 from diagnosis import diagnose
+from tests.support.acting import acting
 from tests.support.own_effects import CUBIC, DETENT
 from tunnel_sim.effects import Effect, effect_class
 from tunnel_sim.effects.mechanics import CubicStiffness
@@ -41,7 +42,7 @@ class OwnCubic(CubicStiffness):
 
 def integrating(effect: Effect) -> Callable[[], float]:
     """A repetition of the fits' integrator on one thread: CPU time of a run of 20,000 steps, s."""
-    run, rig = effect.on_run(RUN, RUN, None), load_rig()
+    run, rig = acting(effect, RUN), load_rig()
 
     def repetition() -> float:
         begin = time.thread_time()
@@ -58,9 +59,7 @@ def speeds(repetitions: int) -> Table:
         *heads, title="Cubic stiffness built in (baseline) against other forms, RK4 steps per second"
     )
     built_in = effect_class("cubic_stiffness")(1.0)
-    model = {
-        e: build_model(load_rig(), e.on_run(RUN, RUN, None)).mj for e in (built_in, CUBIC(1.0), DETENT(1.0))
-    }
+    model = {e: build_model(load_rig(), acting(e, RUN)).mj for e in (built_in, CUBIC(1.0), DETENT(1.0))}
     for name, effect in (("class", OwnCubic(1.0)), ("expression", CUBIC(1.0)), ("detent", DETENT(1.0))):
         times = interleaved(integrating(built_in), integrating(effect), repetitions)
         row(table, f"{name}, fits' integrator", 20_000, *times, "≥ 0.33")

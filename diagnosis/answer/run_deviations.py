@@ -23,7 +23,6 @@ from identification.campaign.random_effects import (
     width_quantiles,
 )
 from tunnel_sim.effects import ALL_EFFECTS
-from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.quantities import PerRun
 from tunnel_sim.vocabulary.record import Array
 
@@ -294,8 +293,8 @@ class RunDeviations:
         problem = self.fitted.problem
         run = problem.data.runs[index]
         stated = problem.stated(self.fitted.point.common, self.fitted.point.per_run[index], run)
-        table = SettingsTable.of([stated])
-        return np.concatenate([one.change(table, problem.data) for one in self.scatter])[:, :2]
+        changes = [one.change(stated.table, problem.data) for one in self.scatter]
+        return np.concatenate(changes)[:, :2]
 
     def _per(self, index: int) -> Array:
         """Relative changes of a run's frequency and damping by a unit of its own spring and damper, shape (2,)."""

@@ -22,8 +22,13 @@ from tunnel_sim.physics.drive import DriveMoment, Lines
 from tunnel_sim.physics.forward import forward_run, integrate
 from tunnel_sim.physics.moment_law import run_dtype
 from tunnel_sim.physics.rod_modes import Ringing, slow_motion
-from tunnel_sim.physics.run_settings import Motion, RunSettings, released_by_spring_end
-from tunnel_sim.physics.settings_table import SettingsTable, column_places
+from tunnel_sim.physics.run_settings import (
+    Motion,
+    RunSettings,
+    SettingsTable,
+    column_places,
+    released_by_spring_end,
+)
 from tunnel_sim.physics.steps import compensated, fit_stride, fit_substeps, input_substeps
 from tunnel_sim.vocabulary.plan import AeroDerivatives
 from tunnel_sim.vocabulary.record import Array

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -16,10 +16,9 @@ from diagnosis.model.run_data import RunData
 from tunnel_sim.effects import Effect, EffectChain
 from tunnel_sim.effects.base import Drawn
 from tunnel_sim.effects.capabilities import Clock
-from tunnel_sim.effects.chain import reads_plainly
+from tunnel_sim.effects.chain import reads_plainly, with_effects
 from tunnel_sim.physics.moment_law import WEIGHTS
 from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.record import Array
 
 _BEYOND = 1e6  # rad or rad/s: at such an angle the integrator stops
@@ -143,7 +142,7 @@ class Problem:
         if not self.scatter:
             return EffectChain(stated, known, drawn)
         deviations = own[None, self.parameters.places(self.scatter)]
-        changed = departure(self.scatter, deviations, SettingsTable.of([stated]), self.data)[0]
+        changed = departure(self.scatter, deviations, stated.table, self.data)[0]
         return EffectChain(stated, (*known, RunDeparture()), (*drawn, changed))
 
     def predict(self, points: Sequence[Point]) -> list[list[Array]]:
@@ -179,20 +178,12 @@ class Problem:
         stated = self.data.model.settings(values, runs)
         at = {i: self.effects_at(points[i].common) for i in dict.fromkeys(i for i, _ in places)}
         effects, drawn = [at[i] for i, _ in places], self._drawn(own)
-        kinds: tuple[type[Effect], ...] = self.effects
         if self.scatter:
             changed = departure(self.scatter, own[:, self.parameters.places(self.scatter)], stated, self.data)
-            kinds, last = (*kinds, RunDeparture), RunDeparture()
+            last = RunDeparture()
             effects = [(*some, last) for some in effects]
             drawn = [(*some, change) for some, change in zip(drawn, changed, strict=True)]
-        physics = stated.copy()
-        for number, kind in enumerate(kinds):
-            kind.on_rows(physics, stated, [row[number] for row in effects], [row[number] for row in drawn])
-        # a spring whose root moves, as in `EffectChain.physics`
-        physics.change_drives(
-            physics.spring_stiffness.tolist(),
-            lambda spring, drive: drive if drive.on_body else replace(drive, scale=spring),
-        )
+        physics = with_effects(stated, effects, drawn)
         if not reads_plainly(effects[0]) or any(physics.rod_twist):
             runs = [run.fine for run in runs]
         zero = values.get("zero", np.zeros(len(runs)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -12,8 +13,7 @@ from diagnosis.model.parameters import Parameter, RunParameterPrior
 from tunnel_sim.effects import ALL_EFFECTS, BetweenRuns, Effect
 from tunnel_sim.effects.base import Drawn
 from tunnel_sim.effects.capabilities import Periodic
-from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.physics.settings_table import SettingsTable
+from tunnel_sim.physics.run_settings import SettingsTable
 from tunnel_sim.vocabulary.plan import AeroDerivatives
 from tunnel_sim.vocabulary.record import Array
 
@@ -94,23 +94,11 @@ class RunDeparture(Effect):
 
     name = "run_departure"
 
-    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Add stiffness and damping, and change the wind's speed by a share; ``drawn`` in this order."""
-        del stated
-        stiffness, damping, faster = self.drawn_numbers(drawn)
-        given = ((name, run.parameters.get(name, 0.0)) for name in _KEEPING_TIME)
-        run = run.with_parameters({name: (1.0 + float(faster)) * value for name, value in given if value})
-        return replace(
-            run,
-            spring_stiffness=max(run.spring_stiffness + float(stiffness), 0.0),
-            mechanical_damping=run.mechanical_damping + float(damping),
-        )
-
     @classmethod
-    def on_rows(
-        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
+    def on_runs(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Self], drawn: Sequence[Drawn]
     ) -> None:
-        """Add stiffness and damping, and change the wind's speed by a share."""
+        """Add stiffness and damping, and change the wind's speed by a share; ``drawn`` in this order."""
         del stated
         added = np.stack([effect.drawn_numbers(d) for effect, d in zip(effects, drawn, strict=True)])
         runs.spring_stiffness[:] = np.maximum(runs.spring_stiffness + added[:, 0], 0.0)

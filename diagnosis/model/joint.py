@@ -20,7 +20,7 @@ from diagnosis.model.starts import Shown, ShownResponse
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.capabilities import Backlash
 from tunnel_sim.effects.parameters import ParameterInfo
-from tunnel_sim.physics.settings_table import SettingsTable
+from tunnel_sim.physics.run_settings import SettingsTable
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError, one_line

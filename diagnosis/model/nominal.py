@@ -22,8 +22,7 @@ from tunnel_sim.effects import BetweenRuns, Effect
 from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.expression import Expression, parse
-from tunnel_sim.physics.run_settings import REFERENCE_SPEED, RunSettings
-from tunnel_sim.physics.settings_table import SettingsTable
+from tunnel_sim.physics.run_settings import REFERENCE_SPEED, RunSettings, SettingsTable
 from tunnel_sim.vocabulary.campaign import Campaign, mean_wind_speed
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.quantities import AnglePerRun, KgM2
@@ -230,7 +229,7 @@ class NominalModel:
         }
         for name, column in columns.items():
             table[name][:] = column
-        table.set(slice(None), self.law_parameters)
+        table.set(self.law_parameters)
         moments: dict[tuple[RunData, float, float], DriveMoment | None] = {}  # equal ones are one object
         for place, (row, run) in enumerate(zip(rows, runs, strict=True)):
             if self.moment:

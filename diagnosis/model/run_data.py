@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from diagnosis.model.run_noise import RunNoise
 from diagnosis.model.similarity import REFERENCE_FREQUENCY
 from tunnel_sim.physics.drive import DriveMoment
-from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.physics.settings_table import SettingsTable
+from tunnel_sim.physics.run_settings import RunSettings, SettingsTable
 from tunnel_sim.vocabulary.campaign import speed_groups
 from tunnel_sim.vocabulary.plan import aerodynamic_stiffness
 from tunnel_sim.vocabulary.record import Array, Record, read_only

@@ -19,7 +19,7 @@ from diagnosis.model.similarity import Similarity
 from diagnosis.model.starts import ShownResponse
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.capabilities import Backlash
-from tunnel_sim.physics.settings_table import SettingsTable
+from tunnel_sim.physics.run_settings import SettingsTable
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array

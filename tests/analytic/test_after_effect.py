@@ -10,6 +10,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from tests.analytic.law_cases import RIG
+from tests.support.acting import acting
 from tunnel_sim.effects import effect_from
 from tunnel_sim.engine.simulate import simulate_motions
 from tunnel_sim.physics.forward import forward_motion
@@ -55,7 +56,7 @@ def settings(after_effect: float, release: float = RELEASE) -> RunSettings:
         SPRING, AeroDerivatives(0.0, 0.0), INERTIA, 0.0, release_angle=release, duration=LENGTH, timestep=1e-3
     )
     effect = effect_from("structural_damping", {"loss_factor": LOSS, "after_effect": after_effect})
-    return effect.on_run(stated, stated, None)
+    return acting(effect, stated)
 
 
 def modelled(after_effect: float, release: float = RELEASE) -> Array:

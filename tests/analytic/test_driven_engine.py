@@ -100,7 +100,7 @@ def test_a_spring_whose_root_moves_acts_by_its_deflection(hold: str) -> None:
         state = solve_ivp(slope, (0.0, 1.0 / RATE), state, "DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
         expected[i + 1] = state[0]
     run = driven(SPRING * root, steps=20, hold=hold, on_body=False)
-    run = run.with_parameters({"stiffness_cubic": cubic, "stiffness_quadratic": quadratic})
+    run = replace(run, parameters={"stiffness_cubic": cubic, "stiffness_quadratic": quadratic})
     for found in (angle(run), forward_motion(RIG, run, RATE).angle):
         assert np.max(np.abs(found - expected)) < 1e-8
     fixed = replace(run, drive=replace(run.drive, on_body=True))  # the same moment, without a moving root
@@ -109,7 +109,7 @@ def test_a_spring_whose_root_moves_acts_by_its_deflection(hold: str) -> None:
 
 def test_friction_holds_a_body_at_rest_until_the_moment_exceeds_it() -> None:
     ramp = 0.02 * TIME  # N m; exceeds the friction after 5 s
-    run = driven(ramp).with_parameters({"friction_moment": 0.1})
+    run = replace(driven(ramp), parameters={"friction_moment": 0.1})
     found = angle(run)
     # friction is that of a step's start: the moment's growth in a step h moves the body by Ṁh³/I at most
     creep = 0.02 * run.timestep**2 / INERTIA * TIME

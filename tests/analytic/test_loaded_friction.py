@@ -14,6 +14,7 @@ import pytest
 from tests.reference.effect_cases import settings
 from tests.reference.effect_oracle import Setting
 from tests.reference.rigs import rig
+from tests.support.acting import acting
 from tunnel_reference import moments
 from tunnel_reference.integrator import BoundLaw, Phase, integrate
 from tunnel_sim.effects import effect_from
@@ -32,7 +33,7 @@ FREE = dataclasses.replace(
 
 def loaded(load: float, moment: float = 0.0, **changes):
     run = dataclasses.replace(FREE, **changes)
-    return effect_from("coulomb_friction", {"friction_moment": moment, "load": load}).on_run(run, run, None)
+    return acting(effect_from("coulomb_friction", {"friction_moment": moment, "load": load}), run)
 
 
 @pytest.mark.parametrize("load", [0.02, 0.2])

@@ -12,7 +12,8 @@ from tests.analytic.law_cases import RIG, Case
 from tests.marks import slow
 from tests.reference.effect_cases import settings
 from tests.reference.effect_oracle import Setting, reading
-from tunnel_sim.effects import effect_from
+from tests.support.acting import acting
+from tunnel_sim.effects import EffectChain, effect_from
 from tunnel_sim.engine.model import Model, build_model
 from tunnel_sim.engine.simulate import simulate_motion, simulate_motions
 from tunnel_sim.physics.forward import forward_motion
@@ -26,7 +27,7 @@ _DEFLECTION = state_names().index("deflection")
 
 def _with_friction(run: RunSettings, moment: float, reach: float) -> RunSettings:
     effect = effect_from("coulomb_friction", {"friction_moment": moment, "presliding": reach})
-    return effect.on_run(run, run, None)
+    return acting(effect, run)
 
 
 @pytest.mark.parametrize(
@@ -127,7 +128,7 @@ def test_a_range_too_short_for_the_step_stays_stable(reach: float, step: float) 
 def test_threads_and_batches_give_the_same_bits() -> None:
     friction = effect_from("coulomb_friction", {"friction_moment": 0.03, "presliding": 0.004})
     runs = [replace(settings(Setting(spring=k)), duration=0.5) for k in (16.12, 44.84, 67.98)]
-    true = [friction.on_run(run, run, None) for run in runs]
+    true = [acting(friction, run) for run in runs]
     first, *rest = (simulate_motions(RIG, true, 1000.0, nthread=n) for n in (1, 2, 3))
     for others in rest:
         assert all(np.array_equal(a.angle, b.angle) for a, b in zip(first, others, strict=True))
@@ -140,8 +141,8 @@ def test_it_goes_together_with_a_twisting_rod_in_either_order(reverse: bool) -> 
         effect_from("rod_flexibility", {"compliance": 1e-3, "inertia_share": 0.05}),
     ]
     run = replace(settings(Setting()), duration=3.0)
-    for effect in reversed(effects) if reverse else effects:
-        run = effect.on_run(run, run, None)
+    ordered = tuple(reversed(effects)) if reverse else tuple(effects)
+    run = EffectChain(run, ordered, (None, None)).physics()
     finer = replace(run, timestep=run.timestep / 4)
     one, other = (forward_motion(RIG, r, SAMPLE_RATE).angle for r in (run, finer))
     assert np.max(np.abs(one - other)) < 2e-5

@@ -13,8 +13,7 @@ from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.forward import forward_run, integrate
 from tunnel_sim.physics.moment_law import parameter_vector
 from tunnel_sim.physics.rod_modes import Ringing, slow_motion
-from tunnel_sim.physics.run_settings import RodTwist, RunSettings, spring_end_angle
-from tunnel_sim.physics.settings_table import SettingsTable
+from tunnel_sim.physics.run_settings import RodTwist, RunSettings, SettingsTable, spring_end_angle
 from tunnel_sim.physics.steps import compensated, fit_stride
 from tunnel_sim.vocabulary.plan import AeroDerivatives
 from tunnel_sim.vocabulary.record import Array

@@ -26,6 +26,7 @@ from tests.reference.effect_oracle import (
     reading,
     under_moment,
 )
+from tests.support.acting import acting
 from tunnel_reference.draw import CampaignDraw, EffectDraw
 from tunnel_reference.forms import forms_of
 from tunnel_reference.readings import ReadingTerm
@@ -305,7 +306,7 @@ def random_moment(intensity: float, bandwidth: float, duration: float, seed: int
     effect = effect_from("buffeting", {"intensity": intensity, "bandwidth": bandwidth})
     run = replace(settings(RUN), duration=duration)
     drawn = effect.draw(run, np.random.default_rng(seed))
-    (series,) = effect.on_run(run, run, drawn).series.values()
+    (series,) = acting(effect, run, drawn).series.values()
     assert series.interval == 1e-3
     return np.array(series.values)
 

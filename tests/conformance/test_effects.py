@@ -12,11 +12,11 @@ import pytest
 from tests.reference.effect_cases import VALUES, VOCABULARY, settings
 from tests.reference.effect_oracle import Setting
 from tunnel_sim.effects import ALL_EFFECTS, Effect, EffectChain, effect_class, effect_from
+from tunnel_sim.effects.chain import with_effects
 from tunnel_sim.engine import effect_laws
 from tunnel_sim.engine.simulate import simulate
 from tunnel_sim.files.rig_file import load_rig
-from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.physics.settings_table import SettingsTable
+from tunnel_sim.physics.run_settings import RunSettings, SettingsTable
 from tunnel_sim.vocabulary.dimensions import dimension
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import SensorModel
@@ -187,33 +187,33 @@ def test_only_a_second_mode_may_be_the_motion_itself(kind: type[Effect]) -> None
     assert implausible == ([0.9, 1.0, 1.2] if kind.name == "second_mode" else [])
 
 
-def table_of(count: int) -> SettingsTable:
-    return SettingsTable.of(
-        [replace(WIND_ON, wind_speed=float(10 * n), spring_stiffness=16.0 + n) for n in range(count)]
-    )
-
-
 @each_effect
-def test_many_runs_change_as_each_of_them_does(kind: type[Effect]) -> None:
-    """Among them a null effect, a run without wind, and speeds and springs that differ."""
+def test_a_run_changes_beside_others_as_alone(kind: type[Effect]) -> None:
+    """The others have other values of the effect, none among them, no wind, and other speeds and springs."""
     null = effect_from(kind.name, {kind.parameters()[0].name: 0.0})
-    effects = [example(kind), example(kind), example(kind), null]
-    if kind.chosen_spring() is not None:
-        effects[1] = replace(effects[1], **{str(kind.chosen_spring()): 17.0})
-    stated = table_of(len(effects))
-    drawn = [effect.draw(stated.row(n), np.random.default_rng(n)) for n, effect in enumerate(effects)]
-    together, apart = stated.copy(), stated.copy()
-    kind.on_rows(together, stated, effects, drawn)
-    for n, (effect, own) in enumerate(zip(effects, drawn, strict=True)):
-        apart.put(n, effect.on_run(stated.row(n), stated.row(n), own))
-    np.testing.assert_allclose(together.numbers, apart.numbers, rtol=1e-14)
-    assert together.series == apart.series
-    assert together.rod_twist == apart.rod_twist
-    assert together.program == apart.program
-    assert together.drive == apart.drive
+    effects = [
+        example(kind),
+        replace(example(kind), **{kind.parameters()[0].name: 0.02}),
+        null,
+        example(kind),
+    ]
+    runs = [replace(WIND_ON, wind_speed=10.0 * n, spring_stiffness=16.0 + n) for n in range(len(effects))]
+    runs[3] = effect_laws.stated(kind, runs[3])
+    if (spring := kind.chosen_spring()) is not None:
+        effects[1] = replace(effects[1], **{spring: 17.0})
+    draws = [effect.draw(run, np.random.default_rng(7)) for effect, run in zip(effects, runs, strict=True)]
+    together = with_effects(SettingsTable.of(runs), [(one,) for one in effects], [(one,) for one in draws])
+    alone = [
+        with_effects(run.table, [(effect,)], [(own,)]).row(0)
+        for run, effect, own in zip(runs, effects, draws, strict=True)
+    ]
+    for n, run in enumerate(alone):
+        drives = run.drive, together.drive[n]
+        assert replace(together.row(n), drive=None) == replace(run, drive=None)
+        assert drives == (None, None) or vars(drives[0]) == vars(drives[1])
 
 
 def test_a_table_gives_back_the_runs_it_was_made_of() -> None:
     runs = [WIND_ON, replace(WIND_OFF, parameters={"friction_moment": 0.02}, release_rate=-0.3)]
     table = SettingsTable.of(runs)
-    assert [replace(table.row(n), timestep=run.timestep) for n, run in enumerate(runs)] == runs
+    assert [table.row(n) for n in range(len(runs))] == runs

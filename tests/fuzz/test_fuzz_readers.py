@@ -34,6 +34,7 @@ from tests.fuzz.texts import (
     to_toml,
 )
 from tests.fuzz.values import Draw, one_in, place_in, spoilt
+from tests.support.acting import acting
 from tunnel_sim.vocabulary.errors import TunnelError
 
 Reader = Callable[[Path, Draw], None]
@@ -173,7 +174,7 @@ def effects_file(folder: Path, draw: Draw) -> None:
     stated = RunSettings(16.12, AeroDerivatives(0.4, -0.1), 0.1, 0.01, wind_speed=15.0)
     for kind in read_effects(written(folder / "effects.toml", content, draw)):
         effect = kind(*kind.example)
-        effect.on_run(stated, stated, None)
+        acting(effect, stated)
         if isinstance(effect, ReadingEffect):
             effect.on_angle(np.linspace(-0.3, 0.3, 5), np.arange(5.0), stated, None)
         if oracle := effect.moment_oracle(stated):

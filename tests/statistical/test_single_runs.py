@@ -17,6 +17,7 @@ from identification.estimators import make_estimator
 from identification.estimators.output_error import OutputError
 from identification.signal.run_fit import NO_WINDOWS
 from identification.uncertainty.cramer_rao import damped_sinusoid_bound
+from tests.support.acting import acting
 from tunnel_reference.moments import turbulence
 from tunnel_reference.true_conditions import TrueConditions
 from tunnel_sim.effects.random_moments import Buffeting
@@ -137,7 +138,7 @@ def random_moment(kind, seed):
             release_angle=AMPLITUDE, duration=DURATION,
         )  # fmt: skip
         effect = Buffeting(intensity=0.003, bandwidth=20.0)
-        moved = effect.on_run(settings, settings, effect.draw(settings, np.random.default_rng(seed)))
+        moved = acting(effect, settings, effect.draw(settings, np.random.default_rng(seed)))
         return 0.25 / 0.003 * np.array(moved.series["forcing"].values)[:count]
     one = np.ones(1)
     conditions = TrueConditions(

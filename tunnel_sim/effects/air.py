@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from math import log, sqrt
+from math import sqrt
+from typing import Self
 
 import numpy as np
 
@@ -23,8 +24,7 @@ from tunnel_sim.effects.parameters import (
     ramp,
     settling,
 )
-from tunnel_sim.physics.run_settings import REFERENCE_SPEED, RunSettings, Series
-from tunnel_sim.physics.settings_table import SettingsTable
+from tunnel_sim.physics.run_settings import REFERENCE_SPEED, Series, SettingsTable
 from tunnel_sim.vocabulary.record import Array
 
 
@@ -191,18 +191,9 @@ class ReynoldsDependence(Effect):
         """None with one wind speed, whose Cnβ it leaves as it is."""
         return super().trials(campaign) if len(campaign.wind_speeds) > 1 else ()
 
-    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Use the coefficient at the stated speed."""
-        del drawn
-        if stated.wind_speed <= 0.0:
-            return run
-        factor = 1.0 + self.per_e_fold * log(stated.wind_speed / stated.mean_speed)
-        changed = dataclasses.replace(run.derivatives, cn_beta=factor * run.derivatives.cn_beta)
-        return dataclasses.replace(run, derivatives=changed)
-
     @classmethod
-    def on_rows(
-        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
+    def on_runs(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Self], drawn: Sequence[Drawn]
     ) -> None:
         """Use the coefficients at the stated speeds."""
         del drawn
@@ -235,17 +226,9 @@ class FlowMisalignment(Effect):
         "n", "1", "power of the speed in the angle", scale=0.5, lower=-3.0, upper=3.0, form=True
     )
 
-    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Set the flow angle in the moment law."""
-        del drawn
-        grown = self.angle
-        if stated.wind_speed > 0.0:
-            grown *= (stated.wind_speed / REFERENCE_SPEED) ** self.exponent
-        return run.with_parameters({"flow_angle": grown})
-
     @classmethod
-    def on_rows(
-        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
+    def on_runs(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Self], drawn: Sequence[Drawn]
     ) -> None:
         """Set the flow angle in the moment law."""
         del drawn
@@ -279,18 +262,9 @@ class WindSpeedOffset(Effect):
         at_most = 0.5 * min(campaign.wind_speeds, default=0.0)
         return [dataclasses.replace(trial, at_most=at_most) for trial in super().trials(campaign)]
 
-    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Use the true speed."""
-        del drawn
-        if stated.wind_speed <= 0.0 or self.is_null:
-            return run
-        grown = self.offset * (stated.wind_speed / REFERENCE_SPEED) ** self.exponent
-        series = _faster(run.series, grown)
-        return dataclasses.replace(run, wind_speed=max(0.0, run.wind_speed + grown), series=series)
-
     @classmethod
-    def on_rows(
-        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
+    def on_runs(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Self], drawn: Sequence[Drawn]
     ) -> None:
         """Use the true speeds."""
         del drawn
@@ -351,33 +325,21 @@ class WindSpeedDrift(Effect):
         """None in normalised form."""
         return () if campaign.normalised else super().trials(campaign)
 
-    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Replace the constant wind speed by a sampled drift; two samples suffice where it is linear."""
-        del drawn
-        if stated.wind_speed <= 0.0 or self.is_null:
-            return run
-        part = ramp(np.linspace(0.0, 1.0, 2 if self.settling == 0.0 else _SAMPLES), self.settling)
-        speeds = run.wind_speed * (1.0 + self.drift * part)
-        drifting = Series(tuple(speeds.tolist()), stated.duration / (part.size - 1))
-        return dataclasses.replace(run, series={**run.series, "wind_speed": drifting})
-
     @classmethod
-    def on_rows(
-        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
+    def on_runs(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Self], drawn: Sequence[Drawn]
     ) -> None:
-        """Replace the constant wind speeds by sampled drifts."""
+        """Replace the constant wind speeds by sampled drifts; two samples suffice where they are linear."""
         del drawn
         acts, duration = (stated.wind_speed > 0.0) & (cls.column(effects, "drift") != 0.0), stated["duration"]
         shapes: dict[float, Array] = {}
         for place in np.flatnonzero(acts).tolist():
-            effect = effects[place]
-            assert isinstance(effect, WindSpeedDrift)
-            settling = effect.settling
+            drift, settling = effects[place].drift, effects[place].settling
             if settling not in shapes:
                 count = 2 if settling == 0.0 else _SAMPLES
                 shapes[settling] = ramp(np.linspace(0.0, 1.0, count), settling)
             part = shapes[settling]
-            speeds = runs.wind_speed[place] * (1.0 + effect.drift * part)
+            speeds = runs.wind_speed[place] * (1.0 + drift * part)
             drifting = Series(tuple(speeds.tolist()), float(duration[place]) / (part.size - 1))
             runs.series[place] = {**runs.series[place], "wind_speed": drifting}
 
@@ -411,17 +373,9 @@ class VortexShedding(Periodic, AtRandom):
         """A line at one Strouhal number."""
         return (residuals.wind_line(0.02, 0.60, "width"),)
 
-    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Set the terms of the moment law, with the phase drawn for the run."""
-        del stated
-        if self.is_null:
-            return run
-        shedding = {"shedding_amplitude": self.amplitude, "strouhal_number": self.strouhal_number}
-        return run.with_parameters(shedding | {"shedding_phase": self.drawn_number(drawn)})
-
     @classmethod
-    def on_rows(
-        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
+    def on_runs(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Self], drawn: Sequence[Drawn]
     ) -> None:
         """Set the terms of the moment law, with the phases drawn for the runs."""
         del stated

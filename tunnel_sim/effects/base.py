@@ -8,13 +8,12 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, Self, TypeAlias
 
 import numpy as np
 
 from tunnel_sim.effects.traits import Traits
-from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.physics.settings_table import SettingsTable
+from tunnel_sim.physics.run_settings import RunSettings, SettingsTable
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.record import Array
 
@@ -102,38 +101,24 @@ class Effect(Traits):
         values = (getattr(self, info.name) for info in self.parameters())
         return dict(zip(self.law_terms, values, strict=False))
 
-    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Change the physics of a run; by default, set the effect's terms of the moment law.
-
-        Args:
-            run: as the earlier effects left it.
-        """
-        del stated, drawn
-        law = self.law()
-        return run.with_parameters(law) if law else run
-
     @classmethod
-    def on_rows(
-        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
+    def on_runs(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Self], drawn: Sequence[Drawn]
     ) -> None:
-        """Change the physics of many runs in place, as `on_run` does for one; without the integration step.
-
-        An effect that overrides `on_run` may also override this hook, which is faster. A test compares both.
+        """Change the physics of runs in place; by default, set the effect's terms of the moment law.
 
         Args:
             runs: as the earlier effects left them.
-            effects: of every run, of this class.
+            stated: as the campaign states them, without any effect.
+            effects: of every run; their parameters may differ from run to run.
             drawn: of every run.
         """
-        if cls.on_run is Effect.on_run:
-            first = 0
-            for _, members in itertools.groupby(effects, key=id):
-                count = sum(1 for _ in members)
-                runs.set(slice(first, first + count), effects[first].law())
-                first += count
-            return
-        for place, (effect, own) in enumerate(zip(effects, drawn, strict=True)):
-            runs.put(place, effect.on_run(runs.row(place), stated.row(place), own))
+        del stated, drawn
+        first = 0
+        for _, members in itertools.groupby(effects, key=id):
+            last = first + sum(1 for _ in members)
+            runs.set(effects[first].law(), slice(first, last))
+            first = last
 
     def moment_oracle(self, stated: RunSettings) -> Callable[[float, float, float], float] | None:
         """The moment that the effect adds, computed independently of its hooks, for ``tunnel effects check``.

@@ -8,7 +8,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from tunnel_sim.effects.base import Drawn, Effect
 from tunnel_sim.effects.evidence import Residuals, Sought
 from tunnel_sim.effects.parameters import WindOnRun
 from tunnel_sim.effects.traits import Channel
-from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.run_settings import RunSettings, SettingsTable
 from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Array
 
@@ -39,14 +39,18 @@ class BetweenRuns(Effect):
         del stated
         return float(rng.standard_normal())
 
-    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Scale the number by the run's own factor."""
+    @classmethod
+    def on_runs(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Self], drawn: Sequence[Drawn]
+    ) -> None:
+        """Scale the number by every run's own factor."""
         del stated
-        return run if self.is_null else run.with_deviations({self.scatters: self.deviation(drawn)})
+        own = [effect.deviation(one) for effect, one in zip(effects, drawn, strict=True)]
+        runs.deviate(cls.scatters, np.array(own))
 
     def deviation(self, drawn: Drawn) -> float:
         """The run's own deviation, relative."""
-        return self.severity * self.drawn_number(drawn)
+        return 0.0 if self.is_null else self.severity * self.drawn_number(drawn)
 
     @classmethod
     @abstractmethod

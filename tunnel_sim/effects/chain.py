@@ -10,8 +10,10 @@ import numpy as np
 
 from tunnel_sim.effects.base import Drawn, Effect
 from tunnel_sim.effects.capabilities import Clock, ReadingEffect, SecondOscillation
-from tunnel_sim.physics.run_settings import Motion, RunSettings
+from tunnel_sim.physics.run_settings import Motion, RunSettings, SettingsTable
+from tunnel_sim.physics.steps import for_contact, for_rod
 from tunnel_sim.vocabulary.plan import SensorModel
+from tunnel_sim.vocabulary.quantities import PerRun
 from tunnel_sim.vocabulary.record import Array, Record
 
 
@@ -47,15 +49,10 @@ class EffectChain:
         return cls(stated, tuple(effects), drawn)
 
     def physics(self) -> RunSettings:
-        """The physics of the run with the effects; a spring with a moving root acts with its true stiffness."""
-        run = self.stated
-        for effect, drawn in zip(self.effects, self.drawn, strict=True):
-            run = effect.on_run(run, self.stated, drawn)
-        if self.deviations:
-            run = run.with_deviations(self.deviations)
-        if run.drive is None or run.drive.on_body:
-            return run
-        return replace(run, drive=replace(run.drive, scale=run.spring_stiffness))
+        """The physics of the run with the effects, with steps short enough for a rod and a contact."""
+        deviations = {name: np.array([value]) for name, value in self.deviations.items()}
+        runs = with_effects(self.stated.table, [self.effects], [self.drawn], deviations)
+        return for_rod(for_contact(runs.row(0)))
 
     @property
     def skips(self) -> bool:
@@ -143,6 +140,31 @@ class EffectChain:
     def reads_plainly(self) -> bool:
         """Whether no effect changes the measured angle or the reading."""
         return reads_plainly(self.effects)
+
+
+def with_effects(
+    stated: SettingsTable,
+    effects: Sequence[Sequence[Effect]],
+    drawn: Sequence[Sequence[Drawn]],
+    deviations: Mapping[str, PerRun] | None = None,
+) -> SettingsTable:
+    """The physics of runs with their effects; a spring with a moving root acts with its true stiffness.
+
+    Args:
+        effects: of every run, in the order in which they act; those of the runs are of the same classes.
+        drawn: the random part of each effect, by run.
+        deviations: as in `EffectChain`, by run.
+    """
+    runs = stated.copy()
+    for alike, own in zip(zip(*effects, strict=True), zip(*drawn, strict=True), strict=True):
+        type(alike[0]).on_runs(runs, stated, alike, own)
+    for name, relative in (deviations or {}).items():
+        runs.deviate(name, relative)
+    runs.change_drives(
+        runs.spring_stiffness.tolist(),
+        lambda spring, drive: drive if drive.on_body else replace(drive, scale=spring),
+    )
+    return runs
 
 
 def reads_plainly(effects: Sequence[Effect]) -> bool:

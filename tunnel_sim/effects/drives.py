@@ -10,13 +10,13 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Self
 
 from tunnel_sim.effects.base import Drawn, Effect
 from tunnel_sim.effects.parameters import Circumstances, Trial, parameter
 from tunnel_sim.effects.traits import Text
 from tunnel_sim.physics.drive import DriveMoment
-from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.physics.settings_table import SettingsTable
+from tunnel_sim.physics.run_settings import SettingsTable
 
 _FRANKLIN = "Franklin, Powell & Emami-Naeini, Feedback Control of Dynamic Systems, 8th ed., Pearson 2019"
 _SLOW = 0.03
@@ -38,16 +38,11 @@ class ActuatorEffect(Effect):
     autonomous = False
     driven = True
 
-    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Change the actuator; a free decay has none."""
-        del stated, drawn
-        return run if run.drive is None else dataclasses.replace(run, drive=self._exerted(run.drive))
-
     @classmethod
-    def on_rows(
-        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
+    def on_runs(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Self], drawn: Sequence[Drawn]
     ) -> None:
-        """Change the actuators of many runs."""
+        """Change the actuators; a free decay has none."""
         del stated, drawn
         runs.change_drives(effects, cls._exerted)
 

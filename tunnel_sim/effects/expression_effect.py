@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, make_dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -16,13 +16,10 @@ from tunnel_sim.effects.capabilities import ReadingEffect
 from tunnel_sim.effects.parameters import Circumstances, Trial, moment_scale, parameter
 from tunnel_sim.effects.traits import Channel, Condition
 from tunnel_sim.physics.expression import FUNCTIONS, Expression, parse
-from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.run_settings import RunSettings, SettingsTable
 from tunnel_sim.vocabulary.dimensions import dimension, in_si
 from tunnel_sim.vocabulary.errors import TunnelError, shown
 from tunnel_sim.vocabulary.record import Array
-
-if TYPE_CHECKING:
-    pass
 
 #: Variables of a run: unit, and operation of the moment law.
 _INPUTS = {"b": ("rad", "angle"), "r": ("rad/s", "rate"), "t": ("s", "time"), "V": ("m/s", "speed")}
@@ -86,13 +83,17 @@ class ExpressionEffect(Effect):
 
 
 class _Moment(ExpressionEffect):
-    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Add the moment to the run's program."""
+    @classmethod
+    def on_runs(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Self], drawn: Sequence[Drawn]
+    ) -> None:
+        """Add the moment to the programs of the runs."""
         del drawn
-        if not self._acts(stated):
-            return run
         inputs = {name: operation for name, (_, operation) in _INPUTS.items()}
-        return run.with_moment(self.formula.program(self._constants(stated), inputs))
+        for place, effect in enumerate(effects):
+            run = stated.row(place)
+            if cls._acts(effect, run):
+                runs.add_moment(place, cls.formula.program(cls._constants(effect, run), inputs))
 
     def moment_oracle(self, stated: RunSettings) -> Callable[[float, float, float], float]:
         """The moment by NumPy, without the compiled law."""

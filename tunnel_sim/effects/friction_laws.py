@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
-from tunnel_sim.effects.base import Drawn, Effect
+from tunnel_sim.effects.base import Drawn
 from tunnel_sim.effects.capabilities import Friction
 from tunnel_sim.effects.parameters import parameter
 from tunnel_sim.effects.traits import Text
-from tunnel_sim.physics import steps
-from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.physics.settings_table import SettingsTable
+from tunnel_sim.physics.run_settings import SettingsTable
 from tunnel_sim.vocabulary.record import Array
 
 # At 2 rad/s, saturating friction has risen to 96 %, and 2 % of a peak remain. Beyond, it would resemble damping.
@@ -166,19 +165,9 @@ class CoulombFriction(Friction):
         peak = 1.0 + self.peak * np.exp(-((rate / self.peak_rate) ** 2))
         return np.asarray(self.friction_moment * power * rise * peak, np.float64)
 
-    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Set the terms of the moment law, with steps short enough to resolve the contact."""
-        del stated, drawn
-        law = {"friction_moment": self.friction_moment}
-        if not self.is_null:
-            law |= {term: value for term, own in _CONTACT.items() if (value := getattr(self, own)) != 0.0}
-            if self.peak == 0.0:
-                del law["friction_peak_rate"]
-        return steps.for_contact(run.with_parameters(law))
-
     @classmethod
-    def on_rows(
-        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
+    def on_runs(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Self], drawn: Sequence[Drawn]
     ) -> None:
         """Set the terms of the moment law."""
         del stated, drawn

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import ceil, cos, exp, isclose, log, pi, sqrt
+from math import ceil, cos, exp, log, pi, sqrt
+from typing import Self
 
 import numpy as np
 
@@ -13,10 +13,8 @@ from tunnel_sim.effects.base import SPRING_TOLERANCE, Drawn, Effect
 from tunnel_sim.effects.capabilities import Backlash
 from tunnel_sim.effects.parameters import Circumstances, Trial, WindOnRun, exponent, parameter
 from tunnel_sim.effects.traits import Text
-from tunnel_sim.physics import steps
 from tunnel_sim.physics.expression import parse
-from tunnel_sim.physics.run_settings import RodTwist, RunSettings
-from tunnel_sim.physics.settings_table import SettingsTable
+from tunnel_sim.physics.run_settings import RodTwist, SettingsTable
 
 _RINGING_STEP = 0.02  # relative: the half-power width of a rod's ringing, whose damping is 1 % of critical
 
@@ -228,18 +226,9 @@ class RodFlexibility(Effect):
         slow = min(np.linalg.eigvals(motion), key=abs)
         return float(abs(slow) ** 2), float(-2.0 * slow.real)
 
-    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Let the rod twist, with steps short enough for its own oscillation."""
-        del stated, drawn
-        if self.is_null:
-            return run
-        return steps.for_rod(
-            dataclasses.replace(run, rod_twist=RodTwist(self.compliance, self.inertia_share))
-        )
-
     @classmethod
-    def on_rows(
-        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
+    def on_runs(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Self], drawn: Sequence[Drawn]
     ) -> None:
         """Let the rods twist."""
         del stated, drawn
@@ -292,17 +281,9 @@ class SpringMiscalibration(Effect):
         scale = cls.parameters()[0].scale
         return [Trial({"error": scale, "spring_stiffness": spring}, "error") for spring in springs]
 
-    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Correct the stiffness of the spring's runs."""
-        del drawn
-        concerned = isclose(stated.spring_stiffness, self.spring_stiffness, rel_tol=SPRING_TOLERANCE)
-        if self.is_null or not concerned:
-            return run
-        return dataclasses.replace(run, spring_stiffness=run.spring_stiffness * (1.0 + self.error))
-
     @classmethod
-    def on_rows(
-        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
+    def on_runs(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Self], drawn: Sequence[Drawn]
     ) -> None:
         """Correct the stiffness of the spring's runs."""
         del drawn
@@ -371,36 +352,27 @@ class StructuralDamping(Effect):
         scale=1.0, lower=-10.0, upper=10.0, form=True,
     )  # fmt: skip
 
-    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
+    @classmethod
+    def on_runs(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Self], drawn: Sequence[Drawn]
+    ) -> None:
         """Add the loss and, where the body was held at its release angle, the spring's after-effect.
 
         A loss equal at all frequencies comes from relaxing elements at all frequencies. The slow ones have yielded
         to the release angle, and recover while the body swings.
         """
-        run = super().on_run(run, stated, drawn)
-        if (
-            self.is_null
-            or self.after_effect == 0.0
-            or stated.drive is not None
-            or not stated.spring_stiffness
-        ):
-            return run
-        size = (
-            -2.0 / pi * self.after_effect * self.loss_factor * stated.spring_stiffness * stated.release_angle
-        )
-        lead = sqrt(stated.yaw_inertia / stated.spring_stiffness)
-        constants = {"size": size, "lead": lead, "length": stated.duration}
-        return run.with_moment(_AFTER_EFFECT.program(constants, {"t": "time"}))
-
-    @classmethod
-    def on_rows(
-        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
-    ) -> None:
-        """Add the loss, and the after-effect run by run."""
-        runs["loss_factor"][:] = cls.column(effects, "loss_factor")
-        for place in np.flatnonzero(cls.column(effects, "after_effect")).tolist():
-            run, one = effects[place].on_run, (runs.row(place), stated.row(place), drawn[place])
-            runs.put(place, run(*one))
+        del drawn
+        loss, after_effect = cls.column(effects, "loss_factor"), cls.column(effects, "after_effect")
+        runs["loss_factor"][:] = loss
+        for place in np.flatnonzero((loss != 0.0) & (after_effect != 0.0)).tolist():
+            run = stated.row(place)
+            if run.drive is not None or not run.spring_stiffness:
+                continue
+            share = -2.0 / pi * effects[place].after_effect * effects[place].loss_factor
+            size = share * run.spring_stiffness * run.release_angle
+            lead = sqrt(run.yaw_inertia / run.spring_stiffness)
+            constants = {"size": size, "lead": lead, "length": run.duration}
+            runs.add_moment(place, _AFTER_EFFECT.program(constants, {"t": "time"}))
 
     def unseen_form(self, cn_beta: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
         """Runs cannot show which frequency determines the loss: the motion's, or the rig's in still air.

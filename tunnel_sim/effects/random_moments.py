@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import exp, pi, sqrt
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from tunnel_sim.effects.base import Drawn
 from tunnel_sim.effects.capabilities import AtRandom
 from tunnel_sim.effects.parameters import parameter
-from tunnel_sim.physics.run_settings import RunSettings, Series
+from tunnel_sim.physics.run_settings import RunSettings, Series, SettingsTable
 from tunnel_sim.vocabulary.record import Array
 
 _INTERVAL = 1e-3  # s between samples of the random moment
@@ -55,17 +55,22 @@ class RandomMoment(AtRandom):
         kicks[0] = rng.standard_normal()
         return kicks
 
-    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Add the random moment as a sampled input."""
-        if self.is_null or not self.acts(wind_on=stated.wind_speed > 0.0):
-            return run
-        white = self.drawn_numbers(drawn)
+    @classmethod
+    def on_runs(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Self], drawn: Sequence[Drawn]
+    ) -> None:
+        """Add the random moments as sampled inputs."""
+        speeds = stated.wind_speed.tolist()
+        for place, (effect, own, speed) in enumerate(zip(effects, drawn, speeds, strict=True)):
+            if not effect.is_null and cls.acts(wind_on=speed > 0.0):
+                runs.series[place] = {**runs.series[place], cls.source: cls._moment(effect, own)}
+
+    def _moment(self, drawn: Drawn) -> Series:
         from scipy.signal import lfilter  # here, because it is slow to load
 
-        decay = exp(-2.0 * pi * self.corner * _INTERVAL)
+        white, decay = self.drawn_numbers(drawn), exp(-2.0 * pi * self.corner * _INTERVAL)
         kicks = np.concatenate([white[:1], sqrt(1.0 - decay**2) * white[1:]])
-        series = Series(tuple((self.severity * lfilter([1.0], [1.0, -decay], kicks)).tolist()), _INTERVAL)
-        return dataclasses.replace(run, series={**run.series, self.source: series})
+        return Series(tuple((self.severity * lfilter([1.0], [1.0, -decay], kicks)).tolist()), _INTERVAL)
 
 
 @dataclass(frozen=True)

@@ -77,6 +77,11 @@ def check_described(kind: object) -> None:
         if unasked:
             what, remedy = f"has {unasked[0]}, which nothing asks it for", f"derive it from {one.__name__}"
             raise TunnelError(what, where=where, remedy=remedy)
+    hooks = {hook for one in (Effect, *_CAPABILITIES) for hook in dir(one)}
+    own = sorted(name for name in set(dir(kind)) - hooks if callable(getattr(kind, name)))
+    if strange := [name for name in own if name.startswith("on_")]:
+        what, remedy = f"has {strange[0]}, which nothing asks it for", "change the physics in on_runs"
+        raise TunnelError(what, where=where, remedy=remedy)
     unstated = sorted(
         name for name in dir(kind) if getattr(getattr(kind, name), "__isabstractmethod__", False)
     )

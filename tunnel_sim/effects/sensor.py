@@ -6,10 +6,11 @@ import dataclasses
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Self
 
 import numpy as np
 
-from tunnel_sim.effects.base import NEAR_MOTION, REFERENCE_RELEASE, Drawn, Effect
+from tunnel_sim.effects.base import NEAR_MOTION, REFERENCE_RELEASE, Drawn
 from tunnel_sim.effects.capabilities import (
     Clock,
     CoarseSteps,
@@ -22,8 +23,7 @@ from tunnel_sim.effects.evidence import Residuals, Sought
 from tunnel_sim.effects.parameters import EQUATION, Circumstances, Trial, exponent, parameter, ramp, settling
 from tunnel_sim.physics.drive import DriveMoment, Same
 from tunnel_sim.physics.forward import backlash
-from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.physics.settings_table import SettingsTable
+from tunnel_sim.physics.run_settings import RunSettings, SettingsTable
 from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Array, read_only
 
@@ -267,29 +267,21 @@ class DroppedSamples(Clock):
         del stated
         return float(rng.uniform(0.1, 0.9))
 
-    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Extend the motion to the end of the readings; where the input is lost too, it is linear."""
-        if self.is_null:
-            return run
-        self._instants(drawn)  # an error here, before the motion is computed
-        run = replace(run, duration=run.duration + self.lost_time + _MARGIN)
-        if run.drive is None or stated.drive is None or self.input_kept == 1.0:
-            return run
-        times, instants = Same(run.drive.time_s), self._instants(drawn) * stated.duration
-        late = _after_losses(times, stated.drive.delay, self.lost_time, tuple(instants.tolist()))
-        return replace(run, drive=replace(run.drive, time_s=late))
-
     @classmethod
-    def on_rows(
-        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
+    def on_runs(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Self], drawn: Sequence[Drawn]
     ) -> None:
-        """Extend the motions to the end of the readings; driven ones run by run."""
-        driven = np.array([drive is not None for drive in runs.drive])
+        """Extend the motions to the end of the readings; where the input is lost too, it is linear."""
         lost = cls.column(effects, "lost_time")
-        runs["duration"][:] += np.where((lost != 0.0) & ~driven, lost + _MARGIN, 0.0)
-        for place in np.flatnonzero(driven).tolist():
-            run, one = effects[place].on_run, (runs.row(place), stated.row(place), drawn[place])
-            runs.put(place, run(*one))
+        runs["duration"][:] += np.where(lost != 0.0, lost + _MARGIN, 0.0)
+        for place, drive in runs.inputs.items():
+            effect, as_stated = effects[place], stated.drive[place]
+            if as_stated is None or effect.is_null or effect.input_kept == 1.0:
+                continue
+            instants = cls._instants(effect, drawn[place]) * stated["duration"][place]
+            times, delay = Same(drive.time_s), as_stated.delay
+            late = _after_losses(times, delay, effect.lost_time, tuple(instants.tolist()))
+            runs.drive[place] = replace(drive, time_s=late)
 
     def on_time(self, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
         """The true time runs ahead of the stamps after every instant."""
@@ -483,16 +475,11 @@ class InputDelay(InputClock):
         fit_upper=0.2,  # and four tenths of a period late, below the delay of half a turn of phase
     )
 
-    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Shift the input; a free decay has none."""
-        del stated, drawn
-        return run if run.drive is None else dataclasses.replace(run, drive=self._later(run.drive))
-
     @classmethod
-    def on_rows(
-        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
+    def on_runs(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Self], drawn: Sequence[Drawn]
     ) -> None:
-        """Shift the inputs of many runs."""
+        """Shift the inputs; a free decay has none."""
         del stated, drawn
         runs.change_drives(effects, cls._later)
 

@@ -1,18 +1,18 @@
-"""The physics of one run as numbers, its release and its motion; MuJoCo and the forward integrator use them.
+"""The physics of runs as numbers: a table with a row for every run, and one run, which is a row.
 
-At the release the body is held at its angle, at rest, and its rod is in balance with the spring. With a rod
-of compliance c and a spring Kr, the body's angle is 1 + Kr c times that of the spring's end.
+Effects change tables; MuJoCo and the forward integrator take runs. At the release the body is held at its angle,
+at rest, and its rod is in balance with the spring. With a rod of compliance c and a spring Kr, the body's angle is
+1 + Kr c times that of the spring's end.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cache
 from math import inf, isfinite, sqrt
-from types import MappingProxyType
-from typing import Any
+from typing import Any, Generic, TypeVar, cast
 
 import numpy as np
 
@@ -23,7 +23,11 @@ from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.plan import AeroDerivatives
 from tunnel_sim.vocabulary.quantities import (
     Angles,
+    Laws,
+    PerRun,
     Rates,
+    SpeedPerRun,
+    StiffnessPerRun,
     Times,
 )
 from tunnel_sim.vocabulary.record import Array, read_only
@@ -32,12 +36,11 @@ from tunnel_sim.vocabulary.rig import Rig
 REFERENCE_SPEED = 20.0
 """Wind speed at which a speed-dependent form equals the textbook form, m/s."""
 
-_OWNED = frozenset(
-    {
-        "air_density", "frontal_area", "reference_length", "width", "cn_beta", "cn_r",
-        "spring_stiffness", "mechanical_damping", "yaw_inertia",
-    }
-)  # fmt: skip
+_USUAL_STEP = 1e-3  # s
+_BESIDE = ("wind_speed", "mean_speed", "release_angle", "release_rate", "duration", "timestep")
+_DERIVATIVES = ("cn_beta", "cn_r")
+_OF_RIG = ("frontal_area", "reference_length", "width")
+_Value = TypeVar("_Value")
 
 
 def _check(name: str, value: float, *, above: float = -inf, least: float = -inf) -> None:
@@ -45,12 +48,6 @@ def _check(name: str, value: float, *, above: float = -inf, least: float = -inf)
         bound = f" above {above:g}" if above > -inf else f" of {least:g} or more" if least > -inf else ""
         remedy = "correct the run's settings"
         raise TunnelError(f"{name} = {value!r} must be a finite number{bound}", remedy=remedy)
-
-
-@cache
-def _further() -> frozenset[str]:
-    """Names of the law's parameters without a field of their own."""
-    return frozenset(parameter_names()) - _OWNED
 
 
 @dataclass(frozen=True)
@@ -115,11 +112,226 @@ class RodTwist:
         return sqrt((1.0 / (self.compliance * (1.0 - share)) + spring_stiffness) / (yaw_inertia * share))
 
 
-@dataclass(frozen=True)
-class RunSettings:
-    """The physics of one run.
+@cache
+def column_places() -> Mapping[str, int]:
+    """The place of every column by name: the law's parameters first, in the law's order."""
+    return {name: place for place, name in enumerate((*parameter_names(), *_BESIDE))}
+
+
+@cache
+def _further() -> Mapping[str, int]:
+    """Places of the law's parameters that have no field in `RunSettings`."""
+    own = {"air_density", "spring_stiffness", "mechanical_damping", "yaw_inertia", *_DERIVATIVES, *_OF_RIG}
+    return {name: column_places()[name] for name in parameter_names() if name not in own}
+
+
+@dataclass(frozen=True, eq=False)
+class SettingsTable:
+    """The physics of many runs, which effects change in place; the fields of `RunSettings`, by run.
 
     Args:
+        numbers: by column (`column_places`), in their units, shape (runs, columns); those of the rig are 0.
+    """
+
+    numbers: Array
+    series: list[Mapping[str, Series]]
+    rod_twist: list[RodTwist | None]
+    program: list[tuple[float, ...]]
+    drive: list[DriveMoment | None]
+
+    @classmethod
+    def empty(cls, count: int) -> SettingsTable:
+        """A table of this many runs whose numbers are 0, until they are set, and whose steps are the usual ones."""
+        numbers = np.zeros((count, len(column_places())))
+        numbers[:, column_places()["timestep"]] = _USUAL_STEP
+        return cls(numbers, [{}] * count, [None] * count, [()] * count, [None] * count)
+
+    @classmethod
+    def of(cls, runs: Sequence[RunSettings]) -> SettingsTable:
+        """A table from some runs."""
+        table = cls.empty(len(runs))
+        for place, run in enumerate(runs):
+            table.put(place, run)
+        return table
+
+    def __len__(self) -> int:
+        """Number of runs."""
+        return len(self.numbers)
+
+    def __getitem__(self, name: str) -> PerRun:
+        """A column by its name, in its unit; a view, so that its values can be set."""
+        column: Array = self.numbers[:, column_places()[name]]
+        return column
+
+    @property
+    def spring_stiffness(self) -> StiffnessPerRun:
+        """The stiffness Kr."""
+        return self["spring_stiffness"]
+
+    @property
+    def wind_speed(self) -> SpeedPerRun:
+        """The speed V."""
+        return self["wind_speed"]
+
+    @property
+    def air_density(self) -> PerRun:
+        """The density ρ, kg/m³."""
+        return self["air_density"]
+
+    @property
+    def law(self) -> Laws:
+        """The parameters of the moment law; a view."""
+        return self.numbers[:, : len(parameter_names())]
+
+    def _lists(self, rows: slice) -> tuple[list[Any], ...]:
+        return tuple(given[rows] for given in (self.series, self.rod_twist, self.program, self.drive))
+
+    def copy(self) -> SettingsTable:
+        """An independent copy of the table."""
+        return SettingsTable(self.numbers.copy(), *self._lists(slice(None)))
+
+    def row(self, place: int) -> RunSettings:
+        """One run, as it is now; its numbers are not checked again."""
+        run, rows = RunSettings.__new__(RunSettings), slice(place, place + 1)
+        object.__setattr__(run, "table", SettingsTable(self.numbers[rows].copy(), *self._lists(rows)))
+        return run
+
+    def put(self, place: int, run: RunSettings) -> None:
+        """Replace one run."""
+        self.numbers[place] = run.table.numbers[0]
+        self.series[place], self.rod_twist[place] = run.series, run.rod_twist
+        self.program[place], self.drive[place] = run.program, run.drive
+
+    def set(self, values: Mapping[str, float], rows: slice = slice(None)) -> None:
+        """Set parameters of the moment law in some runs.
+
+        Args:
+            values: by name, in their units (see ``mjcf/plugin/README.md``).
+
+        Raises:
+            TunnelError: when a name is unknown or belongs to a field of `RunSettings`.
+        """
+        places = _further()
+        for name, value in values.items():
+            if name not in places:
+                remedy = did_you_mean(name, sorted(places))
+                raise TunnelError(f"unknown parameter {name!r} of the moment law", remedy=remedy)
+            self.numbers[rows, places[name]] = value
+
+    def add_moment(self, place: int, program: tuple[float, ...]) -> None:
+        """Add a moment on the rod's upper end to one run.
+
+        Args:
+            program: of the moment, as for ``program`` of `RunSettings`.
+        """
+        before = self.program[place]
+        add = (float(operation_names().index("add")),) if before else ()
+        self.program[place] = (*before, *program, *add)
+
+    def deviate(self, name: str, deviations: PerRun) -> None:
+        """Change wind speed, spring or mechanical damping from their statements by a share; never below zero.
+
+        Args:
+            name: of the column.
+            deviations: relative, dimensionless.
+        """
+        factors = np.maximum(0.0, 1.0 + deviations)
+        self[name][:] *= factors
+        for place, (given, factor) in enumerate(zip(self.series, factors.tolist(), strict=True)):
+            if (one := given.get(name)) is not None:
+                values = tuple(factor * value for value in one.values)
+                self.series[place] = {**given, name: Series(values, one.interval)}
+
+    @property
+    def inputs(self) -> dict[int, DriveMoment]:
+        """The inputs of the driven runs by their places."""
+        return {place: drive for place, drive in enumerate(self.drive) if drive is not None}
+
+    def change_drives(
+        self, by: Sequence[Hashable], changed: Callable[[Any, DriveMoment], DriveMoment]
+    ) -> None:
+        """Change the inputs of the driven runs; equal changes of one input give one object.
+
+        Args:
+            by: what changes the input of every run.
+            changed: the input after a change.
+        """
+        known: dict[tuple[Hashable, DriveMoment], DriveMoment] = {}
+        for place, drive in self.inputs.items():
+            change = by[place]
+            if (change, drive) not in known:
+                known[change, drive] = changed(change, drive)
+            self.drive[place] = known[change, drive]
+
+
+class _Field:
+    """A field of a run that the run's table keeps under the same name."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+
+class _Number(_Field):
+    """A number; without a usual value it has to be given."""
+
+    def __init__(self, usual: float | None = None) -> None:
+        self.usual = usual
+
+    def __get__(self, run: RunSettings | None, owner: type) -> float:
+        if run is not None:
+            return run.table.numbers.item(0, column_places()[self.name])
+        if self.usual is None:
+            raise AttributeError(self.name)  # for a dataclass: no default
+        return self.usual
+
+    def __set__(self, run: RunSettings, value: float) -> None:
+        run.table[self.name][0] = value
+
+
+class _Object(_Field, Generic[_Value]):
+    """What is not a number; None: as in an empty table."""
+
+    def __get__(self, run: RunSettings | None, owner: type) -> _Value:
+        value: _Value = cast(Any, None) if run is None else getattr(run.table, self.name)[0]
+        return value
+
+    def __set__(self, run: RunSettings, value: _Value | None) -> None:
+        if value is not None:
+            getattr(run.table, self.name)[0] = value
+
+
+class _Derivatives(_Field):
+    """Cnβ and Cnr, each in its column."""
+
+    def __get__(self, run: RunSettings | None, owner: type) -> AeroDerivatives:
+        if run is None:
+            raise AttributeError(self.name)
+        return AeroDerivatives(*(float(run.table[name][0]) for name in _DERIVATIVES))
+
+    def __set__(self, run: RunSettings, value: AeroDerivatives) -> None:
+        for name in _DERIVATIVES:
+            run.table[name][0] = getattr(value, name)
+
+
+class _Parameters(_Field):
+    """Parameters of the law without a field of their own, each in its column; without those that are 0."""
+
+    def __get__(self, run: RunSettings | None, owner: type) -> Mapping[str, float]:
+        if run is None:
+            return cast(Any, None)  # type: ignore[no-any-return]
+        numbers = run.table.numbers[0].tolist()
+        return {name: numbers[place] for name, place in _further().items() if numbers[place]}
+
+    def __set__(self, run: RunSettings, value: Mapping[str, float] | None) -> None:
+        run.table.set(value or {})
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """The physics of one run: a row of a `SettingsTable`.
+
+    Args:
+        table: of this run alone.
         spring_stiffness: Kr, N m/rad.
         derivatives: Cnβ and Cnr, 1/rad.
         yaw_inertia: Izz, kg m².
@@ -137,25 +349,28 @@ class RunSettings:
         mean_speed: mean stated speed of the campaign's runs with the wind on, m/s.
     """
 
-    spring_stiffness: float
-    derivatives: AeroDerivatives
-    yaw_inertia: float
-    mechanical_damping: float
-    wind_speed: float = 0.0
-    air_density: float = 0.0
-    release_angle: float = 0.0
-    release_rate: float = 0.0
-    duration: float = 10.0
-    timestep: float = 1e-3
-    parameters: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
-    series: Mapping[str, Series] = field(default_factory=lambda: MappingProxyType({}))
-    rod_twist: RodTwist | None = None
-    program: tuple[float, ...] = ()
-    drive: DriveMoment | None = None
-    mean_speed: float = REFERENCE_SPEED
+    table: SettingsTable = field(
+        init=False, repr=False, compare=False, default_factory=lambda: SettingsTable.empty(1)
+    )
+    spring_stiffness: _Number = _Number()
+    derivatives: _Derivatives = _Derivatives()
+    yaw_inertia: _Number = _Number()
+    mechanical_damping: _Number = _Number()
+    wind_speed: _Number = _Number(0.0)
+    air_density: _Number = _Number(0.0)
+    release_angle: _Number = _Number(0.0)
+    release_rate: _Number = _Number(0.0)
+    duration: _Number = _Number(10.0)
+    timestep: _Number = _Number(_USUAL_STEP)
+    parameters: _Parameters = _Parameters()
+    series: _Object[Mapping[str, Series]] = _Object()
+    rod_twist: _Object[RodTwist | None] = _Object()
+    program: _Object[tuple[float, ...]] = _Object()
+    drive: _Object[DriveMoment | None] = _Object()
+    mean_speed: _Number = _Number(REFERENCE_SPEED)
 
     def __post_init__(self) -> None:
-        """Check names and numbers. The plugin checks the bounds of the law's parameters."""
+        """Check the numbers. The plugin checks the bounds of the law's parameters."""
         for name in ("yaw_inertia", "mean_speed", "duration", "timestep"):
             _check(name, getattr(self, name), above=0.0)
         for name in ("spring_stiffness", "wind_speed", "air_density"):
@@ -165,49 +380,6 @@ class RunSettings:
         wind = self.series.get("wind_speed")
         if wind is not None:
             _check("least wind_speed of the series", min(wind.values), least=0.0)
-        if not self.parameters.keys() <= _further():
-            name = next(name for name in self.parameters if name not in _further())
-            remedy = did_you_mean(name, sorted(_further()))
-            raise TunnelError(f"unknown parameter {name!r} of the moment law", remedy=remedy)
-
-    def with_moment(self, program: tuple[float, ...]) -> RunSettings:
-        """A copy with a moment on the rod's upper end added.
-
-        Args:
-            program: of the moment, as for ``program``.
-        """
-        add = (float(operation_names().index("add")),) if self.program else ()
-        return replace(self, program=(*self.program, *program, *add))
-
-    def with_parameters(self, values: Mapping[str, float]) -> RunSettings:
-        """A copy with parameters of the moment law added or replaced.
-
-        Args:
-            values: by name.
-
-        Raises:
-            TunnelError: when a name is unknown or belongs to a field.
-        """
-        parameters = {**self.parameters, **values}
-        if not values.keys() <= _further():
-            return replace(self, parameters=parameters)  # its checks raise the error
-        copy = object.__new__(RunSettings)  # its other fields were checked
-        copy.__dict__.update(self.__dict__, parameters=parameters)
-        return copy
-
-    def with_deviations(self, deviations: Mapping[str, float]) -> RunSettings:
-        """A copy whose wind speed, spring or mechanical damping deviate from their statements; never below zero.
-
-        Args:
-            deviations: relative, by name, dimensionless.
-        """
-        factors = {name: max(0.0, 1.0 + value) for name, value in deviations.items()}
-        series = {
-            name: replace(given, values=tuple(factors.get(name, 1.0) * value for value in given.values))
-            for name, given in self.series.items()
-        }
-        changed: dict[str, Any] = {name: factor * getattr(self, name) for name, factor in factors.items()}
-        return replace(self, series=series, **changed)
 
     def input_moment(self, time: Array) -> Array:
         """The moment of the input at some times since the run's start, N m, shape (n,); 0 in a free decay."""
@@ -235,19 +407,9 @@ class RunSettings:
         Returns:
             Value by name, in the law's order and units.
         """
-        given = {
-            "air_density": self.air_density,
-            "frontal_area": rig.body.frontal_area,
-            "reference_length": rig.body.length,
-            "width": rig.body.width,
-            "cn_beta": self.derivatives.cn_beta,
-            "cn_r": self.derivatives.cn_r,
-            "spring_stiffness": self.spring_stiffness,
-            "mechanical_damping": self.mechanical_damping,
-            "yaw_inertia": self.yaw_inertia,
-            **self.parameters,
-        }
-        return {name: float(given.get(name, 0.0)) for name in parameter_names()}
+        sizes = (rig.body.frontal_area, rig.body.length, rig.body.width)
+        law = dict(zip(parameter_names(), self.table.law[0].tolist(), strict=True))
+        return law | dict(zip(_OF_RIG, sizes, strict=True))
 
 
 def spring_end_angle(run: RunSettings) -> float:

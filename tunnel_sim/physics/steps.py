@@ -20,8 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tunnel_sim.physics.drive import DriveMoment
-from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.physics.settings_table import SettingsTable, column_places
+from tunnel_sim.physics.run_settings import RunSettings, SettingsTable, column_places
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import aerodynamic_damping, aerodynamic_stiffness
 from tunnel_sim.vocabulary.quantities import DurationPerRun, Hertz, Laws, RatePerRun, Seconds, SpeedPerRun
@@ -155,15 +154,16 @@ def for_contact(run: RunSettings) -> RunSettings:
     The motion after a reversal covers at most half the presliding range, and friction that depends on the rate
     changes the rate by at most half of the friction's own range of rates.
     """
+    law = run.parameters
     reach, friction, peak = (
-        run.parameters.get(name, 0.0) for name in ("presliding", "friction_moment", "friction_peak")
+        law.get(name, 0.0) for name in ("presliding", "friction_moment", "friction_peak")
     )
-    if share := run.parameters.get("friction_load", 0.0):
-        weight = sum(abs(run.parameters.get(name, 0.0)) for name in ("gravity_stiffness", "load_stiffness"))
+    if share := law.get("friction_load", 0.0):
+        weight = sum(abs(law.get(name, 0.0)) for name in ("gravity_stiffness", "load_stiffness"))
         driven = run.drive.greatest[0] if run.drive is not None and run.drive.on_body else 0.0
         friction += share * max(weight, driven)
     names = ("friction_saturation", "friction_peak_rate")
-    rates = [rate for name in names if (rate := run.parameters.get(name, 0.0)) > 0.0]
+    rates = [rate for name in names if (rate := law.get(name, 0.0)) > 0.0]
     if friction == 0.0 or (reach == 0.0 and not rates):
         return run
     share = run.rod_twist.inertia_share if run.rod_twist is not None else 1.0
@@ -195,7 +195,7 @@ def check_stable(rig: Rig, run: RunSettings) -> None:
 
 def body_rate(rig: Rig, run: RunSettings) -> float:
     """The rate of `body_rates` for one run, rad/s."""
-    return float(body_rates(rig, SettingsTable.of([run]))[0])
+    return float(body_rates(rig, run.table)[0])
 
 
 def body_rates(rig: Rig, runs: SettingsTable) -> RatePerRun:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from diagnosis import diagnose
+from tests.support.acting import acting
 from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.effects.parameters import Circumstances, WindOnRun
 from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings, simulate_campaign
@@ -61,7 +62,7 @@ def test_the_mean_is_over_the_runs_with_the_wind_on():
     (effect,) = plan_effects(campaign)
     for condition in campaign.conditions:
         stated = run_settings(TRUTH, condition, mean_speed=20.0)
-        seen = effect.on_run(stated, stated, None).derivatives
+        seen = acting(effect, stated).derivatives
         speed = condition.wind_speed
         factor = 1.0 + 0.5 * log(speed / 20.0) if speed else 1.0
         assert seen.cn_beta == pytest.approx(factor * TRUTH.cn_beta, rel=1e-15)

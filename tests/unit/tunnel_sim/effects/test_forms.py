@@ -9,12 +9,12 @@ import pytest
 
 from tests.reference.effect_cases import VALUES, settings
 from tests.reference.effect_oracle import Setting
+from tests.support.acting import acting
 from tunnel_sim.effects import ALL_EFFECTS, Effect, EffectChain, effect_class, effect_from
 from tunnel_sim.effects.parameters import SWING, WindOnRun, ramp
 from tunnel_sim.engine.effect_laws import DRIVE
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_motion
-from tunnel_sim.physics.settings_table import SettingsTable
 
 RIG = load_rig()
 TIME = np.linspace(0.0, 10.0, 1001)
@@ -63,7 +63,7 @@ def test_a_drift_settles_or_quickens(constant: float) -> None:
 
 def test_a_drifting_wind_settles() -> None:
     effect = effect_from("wind_speed_drift", {"drift": 0.1, "settling": 2.5})
-    series = effect.on_run(STATED, STATED, None).series["wind_speed"]
+    series = acting(effect, STATED).series["wind_speed"]
     place = np.arange(len(series.values)) * series.interval
     assert np.array(series.values) == pytest.approx(
         STATED.wind_speed * (1.0 + 0.1 * settled(place, 4.0)), rel=1e-12
@@ -75,11 +75,9 @@ def test_a_drifting_wind_settles() -> None:
 def test_an_offset_and_a_misaligned_flow_follow_a_power_of_the_speed(speed: float) -> None:
     stated = dataclasses.replace(STATED, wind_speed=speed)
     offset = effect_from("wind_speed_offset", {"offset": 0.5, "exponent": -1.0})
-    assert offset.on_run(stated, stated, None).wind_speed == pytest.approx(speed + 0.5 * 20.0 / speed)
+    assert acting(offset, stated).wind_speed == pytest.approx(speed + 0.5 * 20.0 / speed)
     flow = effect_from("flow_misalignment", {"angle": 0.01, "exponent": 0.5})
-    assert flow.on_run(stated, stated, None).parameters["flow_angle"] == pytest.approx(
-        0.01 * np.sqrt(speed / 20.0)
-    )
+    assert acting(flow, stated).parameters["flow_angle"] == pytest.approx(0.01 * np.sqrt(speed / 20.0))
 
 
 def test_a_sensor_may_have_a_square_beside_its_cube() -> None:
@@ -175,33 +173,14 @@ def test_sliding_friction_depends_on_the_rate_and_is_tc_at_the_reference_rate(fo
         timestep=0.0005,
     )  # fmt: skip
     for speed in (0.1, 0.4, 2.0):
-        slid = friction.on_run(dataclasses.replace(run, release_rate=-speed), run, None)
+        slid = acting(friction, dataclasses.replace(run, release_rate=-speed))
         lost = forward_motion(RIG, slid, 2000.0).rate[1] + speed
         assert lost * run.yaw_inertia / slid.timestep == pytest.approx(0.02 * factor(speed), rel=2e-3)
     assert factor(2.0) == pytest.approx(1.0, abs=1e-3)
 
 
-def test_friction_in_rows_is_that_of_each_run() -> None:
-    forms = [
-        {},
-        {"presliding": 0.01},
-        *(form for form, _ in SLIDING.values()),
-        {"exponent": 0.2},
-        {"load": 0.1},
-    ]
-    severities = [0.02] * 5 + [0.0] * 2
-    effects = [
-        effect_from("coulomb_friction", {"friction_moment": severity, **form})
-        for severity, form in zip(severities, forms, strict=True)
-    ]
-    rows, stated = (SettingsTable.of([STATED] * len(effects)) for _ in range(2))
-    type(effects[0]).on_rows(rows, stated, effects, [None] * len(effects))
-    single = SettingsTable.of([effect.on_run(STATED, STATED, None) for effect in effects])
-    assert np.array_equal(rows.law, single.law)
-
-
 def test_the_textbook_friction_has_no_term_of_the_rate() -> None:
-    plain = effect_from("coulomb_friction", {"friction_moment": 0.02}).on_run(STATED, STATED, None)
+    plain = acting(effect_from("coulomb_friction", {"friction_moment": 0.02}), STATED)
     assert dict(plain.parameters) == {"friction_moment": 0.02}
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ from tunnel_sim.effects.base import Drawn
 from tunnel_sim.effects.parameters import parameter
 from tunnel_sim.effects.sensor import InputDelay
 from tunnel_sim.engine.effect_laws import check
-from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.run_settings import RunSettings, SettingsTable
 
 
 @dataclass(frozen=True)
@@ -28,9 +28,8 @@ class Broken(OwnCubic):
 
 @dataclass(frozen=True)
 class ActsAtItsNull(Broken):
-    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        del stated, drawn
-        return run.with_parameters({"stiffness_cubic": self.hardening + 0.1})
+    def law(self) -> Mapping[str, float]:
+        return {"stiffness_cubic": self.hardening + 0.1}
 
 
 @dataclass(frozen=True)
@@ -53,23 +52,22 @@ class Wanders(Broken):
 
     calls: ClassVar[Iterator[int]] = count()
 
-    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        del stated, drawn
-        return (
-            run
-            if self.is_null
-            else run.with_parameters({"stiffness_cubic": self.hardening * (1.0 + next(self.calls))})
-        )
+    def law(self) -> Mapping[str, float]:
+        return {} if self.is_null else {"stiffness_cubic": self.hardening * (1.0 + next(self.calls))}
 
 
 @dataclass(frozen=True)
 class TooStiff(Broken):
     """Its damping is far too strong for the steps."""
 
-    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
+    @classmethod
+    def on_runs(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Self], drawn: Sequence[Drawn]
+    ) -> None:
         del stated, drawn
-        code = (0.0, -5000.0 * self.hardening, 2.0, 7.0)  # number, its value, rate, multiply
-        return run if self.is_null else run.with_moment(code)
+        for place, effect in enumerate(effects):
+            if not effect.is_null:  # number, its value, rate, multiply
+                runs.add_moment(place, (0.0, -5000.0 * effect.hardening, 2.0, 7.0))
 
 
 @dataclass(frozen=True)

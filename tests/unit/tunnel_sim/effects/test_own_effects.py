@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import importlib.metadata
+from collections.abc import Sequence
 from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from diagnosis import diagnose
 from diagnosis.model.similarity import Similarity
 from diagnosis.result import Diagnosis
 from identification.show.quantity import Quantity
+from tests.support.acting import acting
 from tests.support.gap_campaigns import campaign
 from tests.support.own_effects import CUBIC, DETENT, EFFECTS_FILE, OwnCubic
 from tunnel_sim.effects import (
@@ -36,7 +39,7 @@ from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_motion
-from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.run_settings import SettingsTable
 from tunnel_sim.vocabulary.errors import TunnelError
 
 
@@ -50,10 +53,6 @@ def effects_file(tmp_path: Path) -> Path:
 @pytest.fixture
 def clean_registry(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(registry, "_registered", {})
-
-
-def physics(effect: object, run: RunSettings = WIND_ON) -> RunSettings:
-    return effect.on_run(run, run, None)  # type: ignore[attr-defined,no-any-return]
 
 
 def test_a_file_states_classes(effects_file: Path) -> None:
@@ -91,6 +90,7 @@ OF_VOLTS = {
         (changed(channel="gear"), "unknown channel 'gear'"),
         (changed((Periodic, OwnCubic)), "does not state its sought"),
         (changed(on_angle=lambda *_: None), "derive it from ReadingEffect"),
+        (changed(on_run=lambda *_: None), "has on_run, which nothing asks it for"),
         (changed((WindSpeedScatter,), name="own_scatter"), "are built in"),
         (changed((AtRandom, OwnCubic), random="broad_band"), "is a random moment"),
         (changed(**OF_VOLTS), "parameter hardening: unknown unit 'V'"),
@@ -125,14 +125,16 @@ class Wake(Periodic):
     def sought(cls, residuals: Residuals) -> tuple[Sought | None, ...]:
         return (residuals.wind_line(0.1, 0.4, "width"),)
 
-    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
+    @classmethod
+    def on_runs(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Self], drawn: Sequence[Drawn]
+    ) -> None:
         del stated
-        line = {"shedding_amplitude": self.amplitude, "strouhal_number": self.number}
-        return (
-            run.with_parameters(line | {"shedding_phase": self.drawn_number(drawn)})
-            if self.amplitude
-            else run
-        )
+        for place, (effect, own) in enumerate(zip(effects, drawn, strict=True)):
+            if effect.amplitude:
+                runs["shedding_amplitude"][place] = effect.amplitude
+                runs["strouhal_number"][place] = effect.number
+                runs["shedding_phase"][place] = effect.drawn_number(own)
 
 
 def test_a_line_of_ones_own_is_found_with_a_phase_in_every_run() -> None:
@@ -174,7 +176,7 @@ def test_installed_packages_add_effects(monkeypatch: pytest.MonkeyPatch) -> None
 @pytest.mark.parametrize("simulated", [False, True], ids=["forward", "mujoco"])
 def test_the_law_is_the_built_in_one_to_the_bit(simulated: bool) -> None:
     def angle(effect: object) -> np.ndarray:
-        run = physics(effect)
+        run = acting(effect, WIND_ON)
         motion = (
             simulate_motion(build_model(load_rig(), run), 100.0)
             if simulated
@@ -189,10 +191,10 @@ def test_the_law_is_the_built_in_one_to_the_bit(simulated: bool) -> None:
 
 
 def test_two_expressions_add() -> None:
-    both = physics(CUBIC(1.0), physics(CUBIC(1.0)))
+    both = acting(CUBIC(1.0), acting(CUBIC(1.0), WIND_ON))
     angle = forward_motion(load_rig(), both, 100.0).angle
     np.testing.assert_allclose(
-        angle, forward_motion(load_rig(), physics(CUBIC(2.0)), 100.0).angle, atol=1e-12
+        angle, forward_motion(load_rig(), acting(CUBIC(2.0), WIND_ON), 100.0).angle, atol=1e-12
     )
 
 
@@ -210,8 +212,8 @@ def test_a_similar_rig_moves_through_the_same_angles(change: Similarity) -> None
         timestep=change.similar(still.timestep, "s"),
     )
     values = {i.name: change.similar(getattr(effect, i.name), i.unit) for i in DETENT.parameters()}
-    own = forward_motion(load_rig(), physics(effect, still), 100.0)
-    other = forward_motion(load_rig(), physics(DETENT(**values), similar), change.similar(100.0, "Hz"))
+    own = forward_motion(load_rig(), acting(effect, still), 100.0)
+    other = forward_motion(load_rig(), acting(DETENT(**values), similar), change.similar(100.0, "Hz"))
     np.testing.assert_allclose(other.angle, own.angle, atol=1e-9)
 
 

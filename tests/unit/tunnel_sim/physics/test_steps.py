@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.files.rig_file import load_rig
-from tunnel_sim.physics.run_settings import RodTwist, RunSettings, Series
-from tunnel_sim.physics.settings_table import SettingsTable
+from tunnel_sim.physics.run_settings import RodTwist, RunSettings, Series, SettingsTable
 from tunnel_sim.physics.steps import (
     BODY_TURN,
     LEAST_STEP,
