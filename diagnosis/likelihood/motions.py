@@ -30,7 +30,6 @@ from tunnel_sim.physics.run_settings import (
     released_by_spring_end,
 )
 from tunnel_sim.physics.steps import compensated, fit_stride, fit_substeps, input_substeps
-from tunnel_sim.vocabulary.plan import AeroDerivatives
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig
 
@@ -398,11 +397,12 @@ def condensed(physics: RunSettings, data: Data) -> RunSettings:
     share = twist.inertia_share
     air = data.air_moment(physics) * physics.derivatives.cn_beta
     lead = twist.compliance * (share * air + (1.0 - share) * physics.spring_stiffness)
-    air_seen = AeroDerivatives(
-        physics.derivatives.cn_beta * (1.0 + lead), physics.derivatives.cn_r * (1.0 + lead)
-    )
-    inertia = physics.yaw_inertia * (1.0 + (1.0 - share) * lead)
-    return dataclasses.replace(physics, rod_twist=None, derivatives=air_seen, yaw_inertia=inertia)
+    rigid = physics.table.copy()
+    rigid.rod_twist[0] = None
+    for name in ("cn_beta", "cn_r"):
+        rigid[name][0] *= 1.0 + lead
+    rigid["yaw_inertia"][0] *= 1.0 + (1.0 - share) * lead
+    return rigid.row(0)
 
 
 def campaign_rig(data: Data) -> Rig:

@@ -9,7 +9,6 @@ response to the input of a driven run, are added in closed form. Nonlinear terms
 from __future__ import annotations
 
 import cmath
-import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -208,20 +207,16 @@ def slow_motion(run: RunSettings, rig: Rig) -> SlowMotion | None:
     inertia = (linear.spring + strained - air) / abs(root) ** 2
     if not inertia > 0.0:
         return None
-    rigid = dataclasses.replace(
-        run,
-        rod_twist=None,
-        yaw_inertia=inertia,
-        mechanical_damping=-2.0 * root.real * inertia + linear.air_damping * body**2,
-        release_angle=slow.real,
-        release_rate=(root * slow).real,
-    )
+    rigid = run.table.copy()
+    rigid.rod_twist[0], rigid["yaw_inertia"][0] = None, inertia
+    rigid["mechanical_damping"][0] = -2.0 * root.real * inertia + linear.air_damping * body**2
+    rigid["release_angle"][0], rigid["release_rate"][0] = slow.real, (root * slow).real
     responses: tuple[Response, ...] = ()
     if (drive := run.drive) is not None:
         of_slow, of_fast = (linear.residue(one, on_body=drive.on_body) for one in roots)
         of_slow -= (body if drive.on_body else 1.0) / (2j * root.imag * inertia)  # integrated already
         responses = Response(drive, root, of_slow), Response(drive, fast, of_fast)
-    return SlowMotion(rigid, lead.real, strained, run.release_angle, Ringing(ringing, fast, responses))
+    return SlowMotion(rigid.row(0), lead.real, strained, run.release_angle, Ringing(ringing, fast, responses))
 
 
 def _upper_root(inertia: complex, damping: complex, stiffness: complex) -> complex:

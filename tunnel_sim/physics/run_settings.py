@@ -7,7 +7,6 @@ at rest, and its rod is in balance with the spring. With a rod of compliance c a
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -285,7 +284,7 @@ class _Number(_Field):
         return self.usual
 
     def __set__(self, run: RunSettings, value: float) -> None:
-        run.table[self.name][0] = value
+        run.table.numbers[0, column_places()[self.name]] = value
 
 
 class _Object(_Field, Generic[_Value]):
@@ -421,7 +420,9 @@ def released_by_spring_end(run: RunSettings) -> RunSettings:
     """The run with the body's release angle, given the angle of the spring's end, which a record shows."""
     if run.rod_twist is None:
         return run
-    return dataclasses.replace(run, release_angle=run.release_angle * _body_per_end(run))
+    released = run.table.copy()
+    released["release_angle"][0] *= _body_per_end(run)
+    return released.row(0)
 
 
 def _body_per_end(run: RunSettings) -> float:
