@@ -30,7 +30,7 @@ from tunnel_reference.make import as_campaign
 from tunnel_reference.severity import read_and_fit, simulate_motions
 from tunnel_sim.files.campaign_folder import write_campaign
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.record import Record
 
 GROWTH = (12, 48, 144)  # runs
@@ -197,7 +197,7 @@ def joint(folder: Path) -> tuple[Path, Path]:
             angle[place], data.ctrl[0] = data.qpos[0], value
             mujoco.mj_step(truth, data)
         record = Record(time_s, angle + rng.normal(0.0, 2e-4, angle.size))
-        runs.append(Run(f"r{number}", record, 0.0, drive=Drive("drive", control, "zero")))
+        runs.append(Run(f"r{number}", record, 0.0, drive=Input("drive", control, "zero")))
     campaign = Campaign("joint", RigProperties(), SensorProperties(1000.0), tuple(runs))
     model = folder.with_suffix(".xml")
     model.write_text(ARM.format(""))

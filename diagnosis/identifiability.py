@@ -18,9 +18,9 @@ from tunnel_sim.effects import Effect, known_effects
 from tunnel_sim.effects.capabilities import OwnNumbers
 from tunnel_sim.effects.registry import answering_with
 from tunnel_sim.files.rig_file import load_rig
-from tunnel_sim.physics.drive import DriveMoment
+from tunnel_sim.physics.input_moment import InputMoment
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.plan import CampaignPlan, Condition, SensorModel, Truth
 
 ABSORBED = 0.01
@@ -111,9 +111,9 @@ def _nominal(*, driven: bool) -> Fit:
         for number, condition in enumerate(conditions):
             time = np.arange(round(condition.duration * sensor.sample_rate)) / sensor.sample_rate
             values = 0.5 * np.sin(2.0 * np.pi * (1.0 + 2.0 * time / condition.duration) * time)
-            settings = replace(run_settings(truth, condition), drive=DriveMoment(time, values))
+            settings = replace(run_settings(truth, condition), drive=InputMoment(time, values))
             seen = record((), settings, np.random.default_rng([plan.seed, number]), sensor)
-            runs.append(replace(stated_run(condition, seen), drive=Drive("moment_nm", values)))
+            runs.append(replace(stated_run(condition, seen), drive=Input("moment_nm", values)))
         stated = RigProperties.of(load_rig()), SensorProperties.of(sensor)
         campaign = Campaign(plan.name, *stated, tuple(runs))
     else:

@@ -18,8 +18,8 @@ from identification.returned import CAMPAIGN_UNITS, RUN_UNITS, checked_return
 from identification.show.quantity import Quantity
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.dimensions import beside
-from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError, own_traceback, raised_line
+from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.record import Array, Record
 
 if TYPE_CHECKING:
@@ -357,7 +357,7 @@ def _driven_campaign() -> Campaign:
         swing = np.asarray(lsim(system, moment, time)[1])
         yaw = _ZERO + swing + _NOISE * rng.standard_normal(time.size)
         run = _run(number, Record(time, yaw), spring, speed)
-        runs.append(replace(run, release_angle=None, drive=Drive("moment_nm", moment)))
+        runs.append(replace(run, release_angle=None, drive=Input("moment_nm", moment)))
     return _of(runs)
 
 

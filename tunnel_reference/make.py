@@ -19,9 +19,9 @@ from tunnel_reference.true_conditions import (
     WIDTH,
 )
 from tunnel_sim.vocabulary.campaign import Campaign, Repeatability, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive, Hold
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
-from tunnel_sim.vocabulary.inputs import InputColumn
+from tunnel_sim.vocabulary.input_kinds import InputColumn
+from tunnel_sim.vocabulary.inputs import Hold, Input
 from tunnel_sim.vocabulary.record import Record
 
 SCHEMA_VERSION = 1
@@ -86,7 +86,7 @@ def as_campaign(simulated: Simulated, name: str) -> Campaign:
     stamps = np.round(c.time, 9) if c.stamp_step == 0.0 else np.round(c.time / c.stamp_step) * c.stamp_step
     density, start = (np.broadcast_to(value, (c.runs,)) for value in (c.air_density, c.time_start))
     length, speed = c.length_scale, c.length_scale / c.time_scale
-    drives: list[Drive | None] = [None] * c.runs
+    drives: list[Input | None] = [None] * c.runs
     if c.drive is not None:
         column = cast(InputColumn, c.drive.column)
         scale = {
@@ -96,7 +96,7 @@ def as_campaign(simulated: Simulated, name: str) -> Campaign:
         gain = c.drive.gain * c.moment_scale if column == "drive" and c.drive.stated else None
         for run in np.flatnonzero(c.drive.driven).tolist():
             hold: Hold = "zero" if c.drive.held[run] else "linear"
-            drives[run] = Drive(column, c.drive.values[c.written(run), run] * scale, hold, gain)
+            drives[run] = Input(column, c.drive.values[c.written(run), run] * scale, hold, gain)
     runs = tuple(
         Run(
             id=f"r{number + 1:02d}",

@@ -17,7 +17,7 @@ from diagnosis.model.parameters import Point
 from diagnosis.search.study import Study
 from tunnel_sim.effects.capabilities import InputClock
 from tunnel_sim.effects.registry import the_effect
-from tunnel_sim.vocabulary.drive import Hold
+from tunnel_sim.vocabulary.inputs import Hold
 
 
 @dataclass(frozen=True)

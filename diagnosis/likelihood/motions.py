@@ -18,8 +18,8 @@ from tunnel_sim.effects import Effect, EffectChain
 from tunnel_sim.effects.base import Drawn
 from tunnel_sim.effects.chain import reads_plainly
 from tunnel_sim.files.rig_file import load_rig
-from tunnel_sim.physics.drive import DriveMoment, Lines
 from tunnel_sim.physics.forward import forward_run, integrate
+from tunnel_sim.physics.input_moment import InputMoment, Lines
 from tunnel_sim.physics.moment_law import run_dtype
 from tunnel_sim.physics.rod_modes import Ringing, slow_motion
 from tunnel_sim.physics.run_settings import (
@@ -293,7 +293,7 @@ def read_together(
     return found
 
 
-def _lines(inputs: Mapping[int, DriveMoment], step: Array, steps: Array, like: int) -> dict[int, Lines]:
+def _lines(inputs: Mapping[int, InputMoment], step: Array, steps: Array, like: int) -> dict[int, Lines]:
     """The inputs of driven runs as lines, which begin at equal times for a run and its like.
 
     Args:

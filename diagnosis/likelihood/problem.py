@@ -103,7 +103,7 @@ class Problem:
         """Whether the joint carries a moment that varies: gravity's, or that of an actuator."""
         terms = {*self.data.model.law_parameters, *(term for kind in self.effects for term in kind.law_terms)}
         hangs = any(stiffness in terms for stiffness, _ in WEIGHTS)
-        return hangs or any(drive.through_actuator for drive in self.data.inputs)
+        return hangs or any(drive.kind.by_actuator for drive in self.data.inputs)
 
     def effects_at(self, common: Array) -> tuple[Effect, ...]:
         """The effects with their parameters.

@@ -308,7 +308,7 @@ def _circumstances(base: Fit) -> Circumstances:
     greatest = max(float(np.max(np.abs(run.reading))) for run in data.runs)
     moment, rate = 0.0, 0.0
     for run, own in zip(data.runs, base.point.per_run, strict=True):
-        if run.drive is not None and run.drive.through_actuator:
+        if run.drive is not None and run.drive.kind.by_actuator:
             drive = base.problem.stated(base.point.common, own, run).drive
             assert drive is not None
             own_moment, own_rate = drive.greatest

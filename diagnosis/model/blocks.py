@@ -14,7 +14,7 @@ from diagnosis.model.run_data import RunData, UnevenSamples, means_of
 from diagnosis.model.run_noise import WhiteNoise
 from diagnosis.model.similarity import AS_MEASURED, Similarity
 from diagnosis.settings import Settings
-from tunnel_sim.physics.drive import DriveMoment
+from tunnel_sim.physics.input_moment import InputMoment
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 
 LONG_REST: Final = 0.1
@@ -95,15 +95,8 @@ def _driven(data: RunData, run: Run, model: NominalModel) -> RunData:
     assert run.drive is not None
     record = run.record
     begun = 0.0 if record.uniform else 0.5 * record.sample_interval  # as the raster of the blocks does
-    moment = DriveMoment(
-        record.time_s - record.time_s[0] + begun,
-        run.drive.values,
-        scale=run.drive.kind.scale * (1.0 if run.drive.gain is None else run.drive.gain),
-        delay=-model.lead,
-        held=run.drive.held,
-        on_body=run.drive.on_body,
-        by_actuator=run.drive.kind.by_actuator,
-    )
+    scale = run.drive.kind.scale * (1.0 if run.drive.gain is None else run.drive.gain)
+    moment = InputMoment.of(run.drive, record.time_s - record.time_s[0] + begun, scale, -model.lead)
     return dataclasses.replace(data, drive=moment, multiplied_by=model.multiplied_by(run.drive))
 
 

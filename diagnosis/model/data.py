@@ -54,7 +54,7 @@ class Data(PreparedRuns):
         return dataclasses.replace(self, runs=runs)
 
     def with_inputs(self, **change: Any) -> Data:
-        """The same runs with changed fields of their inputs (`DriveMoment`)."""
+        """The same runs with changed fields of their inputs (`InputMoment`)."""
         return self.with_runs(tuple(run.with_input(**change) for run in self.runs))
 
     def undriven(self) -> Data:

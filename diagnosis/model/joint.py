@@ -22,8 +22,8 @@ from tunnel_sim.effects.capabilities import Backlash
 from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.physics.run_settings import SettingsTable
 from tunnel_sim.vocabulary.campaign import Campaign, Run
-from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError, one_line
+from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Actuator, JointLaw
 
@@ -336,7 +336,7 @@ def with_law(campaign: Campaign, law: JointLaw) -> tuple[Campaign, NominalModel]
     return found, (LooseJoint if found.unrestrained else Joint)(law=law)
 
 
-def _as_control(drive: Drive, actuator: Actuator, where: str) -> Drive:
+def _as_control(drive: Input, actuator: Actuator, where: str) -> Input:
     """The command of a position servo as the control of its actuator.
 
     Raises:
@@ -346,10 +346,10 @@ def _as_control(drive: Drive, actuator: Actuator, where: str) -> Drive:
     if not kp > 0.0:
         what = f"the input is command_rad, but {said} does not hold a position"
         raise TunnelError(what, where=where, remedy="name the position actuator, or name the input drive")
-    return Drive("drive", drive.values * (kp / actuator.gain), drive.hold)
+    return Input("drive", drive.values * (kp / actuator.gain), drive.hold)
 
 
-def _of_joint(run: Run, drive: Drive, law: JointLaw) -> Drive:
+def _of_joint(run: Run, drive: Input, law: JointLaw) -> Input:
     """The input of a run with the gain of the joint's actuator; refused where the actuator could not follow it."""
     where, actuator = f"run {run.id}", law.actuator
     if drive.column == "base_rad":

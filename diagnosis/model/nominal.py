@@ -20,11 +20,11 @@ from diagnosis.model.run_data import PreparedRuns, RunData
 from diagnosis.model.similarity import REFERENCE_STIFFNESS, Similarity
 from tunnel_sim.effects import BetweenRuns, Effect
 from tunnel_sim.effects.parameters import ParameterInfo
-from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.expression import Expression, parse
+from tunnel_sim.physics.input_moment import InputMoment
 from tunnel_sim.physics.run_settings import REFERENCE_SPEED, RunSettings, SettingsTable
 from tunnel_sim.vocabulary.campaign import Campaign, mean_wind_speed
-from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.quantities import AnglePerRun, KgM2
 from tunnel_sim.vocabulary.record import Array
 
@@ -101,7 +101,7 @@ class NominalModel:
             unknown_gain=any(run.multiplied_by == GAIN for run in runs),
         )
 
-    def fits_gain(self, drive: Drive) -> bool:
+    def fits_gain(self, drive: Input) -> bool:
         """Whether the gain of an input is fitted.
 
         Per unit inertia, a known moment has an unknown gain too: one over the inertia. The motion of the spring's
@@ -109,7 +109,7 @@ class NominalModel:
         """
         return self.multiplied_by(drive) == GAIN
 
-    def multiplied_by(self, drive: Drive) -> str:
+    def multiplied_by(self, drive: Input) -> str:
         """The parameter that multiplies the moment of an input as the run states it; empty: none."""
         kind = drive.kind
         if kind.by_inertia:
@@ -230,7 +230,7 @@ class NominalModel:
         for name, column in columns.items():
             table[name][:] = column
         table.set(self.law_parameters)
-        moments: dict[tuple[RunData, float, float], DriveMoment | None] = {}  # equal ones are one object
+        moments: dict[tuple[RunData, float, float], InputMoment | None] = {}  # equal ones are one object
         for place, (row, run) in enumerate(zip(rows, runs, strict=True)):
             if self.moment:
                 table.program[place] = _program(self.moment, spring[place])

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from diagnosis.model.run_noise import RunNoise
 from diagnosis.model.similarity import REFERENCE_FREQUENCY
-from tunnel_sim.physics.drive import DriveMoment
+from tunnel_sim.physics.input_moment import InputMoment
 from tunnel_sim.physics.run_settings import RunSettings, SettingsTable
 from tunnel_sim.vocabulary.campaign import speed_groups
 from tunnel_sim.vocabulary.plan import aerodynamic_stiffness
@@ -136,7 +136,7 @@ class RunData:
     start: float = 0.0
     derivative: int = 0
     samples: UnevenSamples | None = None
-    drive: DriveMoment | None = None
+    drive: InputMoment | None = None
     multiplied_by: str = ""
     stretch_of: str | None = None
     merges: int = 1
@@ -182,7 +182,7 @@ class RunData:
         free = self.spring_stiffness, self.wind_speed, self.air_density, self.interval, self.derivative
         return free if self.drive is None else (*free, id(self.drive), self.start)
 
-    def moment(self, gain: float, offset: float = 0.0) -> DriveMoment | None:
+    def moment(self, gain: float, offset: float = 0.0) -> InputMoment | None:
         """The moment of the input from the first block on; None of a free decay.
 
         Args:
@@ -196,7 +196,7 @@ class RunData:
         return dataclasses.replace(self._seen_drive, scale=scale, offset=offset)
 
     @cached_property
-    def _seen_drive(self) -> DriveMoment | None:
+    def _seen_drive(self) -> InputMoment | None:
         """The samples of the input that the blocks see, with the delay from the first block on."""
         if self.drive is None:
             return None
@@ -376,7 +376,7 @@ class PreparedRuns(RunGroups[RunData]):
     width: float
 
     @property
-    def inputs(self) -> tuple[DriveMoment, ...]:
+    def inputs(self) -> tuple[InputMoment, ...]:
         """The moments of the driven runs."""
         return tuple(run.drive for run in self.runs if run.drive is not None)
 

@@ -10,7 +10,7 @@ from diagnosis.model.choose import nominal_model
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.similarity import REFERENCE_FREQUENCY, Similarity, free_frequency
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties
-from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.record import Record
 
 
@@ -60,7 +60,7 @@ def similar_campaign(campaign: Campaign, model: NominalModel | None = None) -> t
     return similar, change
 
 
-def _drive(drive: Drive, change: Similarity) -> Drive:
+def _drive(drive: Input, change: Similarity) -> Input:
     """An input, whose own times are those of its record."""
     if drive.kind.takes_gain:  # the values stay as they are
         return dataclasses.replace(drive, gain=None if drive.gain is None else drive.gain * change.moment)

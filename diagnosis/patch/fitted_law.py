@@ -115,7 +115,7 @@ class FittedLaw:
         for run in problem.data.runs:
             drive = problem.chain(self.common, self.release, run).physics().drive
             moment = np.zeros(run.reading.size)
-            if drive is not None and drive.through_actuator:
+            if drive is not None and drive.kind.by_actuator:
                 acting = drive.acting
                 moment = acting.scale * np.interp(run.times - acting.delay, acting.time_s, acting.values)
             found.append((run.reading - zero, moment))

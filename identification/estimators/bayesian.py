@@ -32,7 +32,7 @@ from identification.signal.free_decay import Decay, response_rows
 from identification.signal.run_fit import NO_WINDOWS, Gained, decay_covariance_of, describe_run, identify_run
 from identification.statistics import determined, inner
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
-from tunnel_sim.vocabulary.inputs import KnownGain
+from tunnel_sim.vocabulary.input_kinds import KnownGain
 from tunnel_sim.vocabulary.record import Array
 
 # Half width and step in standard deviations: for a normal distribution the sum is exact to 1e-7.

@@ -24,7 +24,7 @@ from scipy.linalg import expm
 from identification.policy import LEAST_CORNER_DROP, LEAST_MOMENT_DROP, MOMENT_DROP_FOR_CORNER
 from identification.signal.free_decay import Decay, response_rows
 from identification.statistics import inner, inverse, scaled_solve
-from tunnel_sim.vocabulary.inputs import KnownGain
+from tunnel_sim.vocabulary.input_kinds import KnownGain
 from tunnel_sim.vocabulary.quantities import Angles
 from tunnel_sim.vocabulary.record import Array
 

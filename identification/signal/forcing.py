@@ -34,7 +34,7 @@ from identification.signal.run_unknowns import (
 )
 from identification.statistics import determined, eliminate
 from tunnel_sim.vocabulary.campaign import Run
-from tunnel_sim.vocabulary.inputs import KnownGain
+from tunnel_sim.vocabulary.input_kinds import KnownGain
 from tunnel_sim.vocabulary.quantities import Angles, Gain, Times, Vector
 from tunnel_sim.vocabulary.record import Array, Record
 

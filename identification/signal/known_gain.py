@@ -9,8 +9,8 @@ from identification.signal.decay_fit import Reading, fit_decays
 from identification.signal.forcing import driven_start
 from identification.statistics import determined, inverse
 from tunnel_sim.vocabulary.campaign import Campaign, Run
-from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.record import evenly_spaced
 
 _DEGREES = 180.0 / np.pi
@@ -33,7 +33,7 @@ def refuse_other_gains(campaign: Campaign) -> None:
             _refuse_other_gain(run, run.drive, sensor.derivative, where, judged=sensor.plausible is not False)
 
 
-def _refuse_other_gain(run: Run, drive: Drive, derivative: int, where: str, *, judged: bool) -> None:
+def _refuse_other_gain(run: Run, drive: Input, derivative: int, where: str, *, judged: bool) -> None:
     record, column = evenly_spaced(run.record), drive.column
     values = np.interp(record.time_s, run.record.time_s, drive.values)
     start = driven_start(record.time_s, record.yaw_rad, values, derivative=derivative)

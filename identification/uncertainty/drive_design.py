@@ -17,8 +17,8 @@ import numpy as np
 
 from identification.signal.forcing import driven_rows
 from identification.uncertainty.cramer_rao import CampaignBound, campaign_bound
-from tunnel_sim.files.plan_drive import DriveTable, check_drive
 from tunnel_sim.files.plan_file import PlanDocument, SensorModelTable, plan_from
+from tunnel_sim.files.plan_input import InputTable, check_input_table
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import (
@@ -133,7 +133,7 @@ def peak_response(plan: CampaignPlan, rig: Rig) -> float:
     return peak
 
 
-def driven_plan(document: PlanDocument, drive: DriveTable, duration: float) -> PlanDocument:
+def driven_plan(document: PlanDocument, drive: InputTable, duration: float) -> PlanDocument:
     """A plan with one driven run of each spring and speed in place of its free decays.
 
     Args:
@@ -145,7 +145,7 @@ def driven_plan(document: PlanDocument, drive: DriveTable, duration: float) -> P
 
 
 def within_limits(
-    document: PlanDocument, drive: DriveTable, rig: Rig, limits: Limits, duration: float
+    document: PlanDocument, drive: InputTable, rig: Rig, limits: Limits, duration: float
 ) -> PlanDocument:
     """The driven plan with the largest input that the limits allow.
 
@@ -196,13 +196,13 @@ def propose_drive(
         coarse = document.model_copy(update={"sensor": thin})
     tried: dict[str, float] = {}
 
-    def score(drive: DriveTable) -> float:
+    def score(drive: InputTable) -> float:
         key = drive.model_dump_json()
         if key in tried:
             return tried[key]
         unit = driven_plan(coarse, drive, length)
         try:
-            check_drive(drive, unit.samples, unit.sample_rate, unit.name)
+            check_input_table(drive, unit.samples, unit.sample_rate, unit.name)
         except TunnelError:
             tried[key] = inf
         else:
@@ -241,8 +241,8 @@ def propose_drive(
 
 
 def _moved(
-    make: Callable[[list[float]], DriveTable], start: list[float], score: Callable[[DriveTable], float]
-) -> DriveTable:
+    make: Callable[[list[float]], InputTable], start: list[float], score: Callable[[InputTable], float]
+) -> InputTable:
     """The input made from frequencies (Hz) that are changed one at a time, in shorter and shorter steps."""
     rates, best = start, make(start)
     for step in _STEPS:
@@ -256,29 +256,29 @@ def _moved(
     return best
 
 
-def _stepped(rates: list[float]) -> DriveTable:
+def _stepped(rates: list[float]) -> InputTable:
     if len(rates) == 1:
         return _table("sine", frequency_hz=rates[0])
     return _table("stepped_sine", frequencies_hz=rates)
 
 
-def _band(kind: str) -> Callable[[list[float]], DriveTable]:
+def _band(kind: str) -> Callable[[list[float]], InputTable]:
     return lambda ends: _table(kind, from_hz=ends[0], to_hz=ends[1])
 
 
-def _table(kind: str, **keys: float | list[float]) -> DriveTable:
+def _table(kind: str, **keys: float | list[float]) -> InputTable:
     rounded = {
         name: [_rounded(f) for f in value] if isinstance(value, list) else _rounded(value)
         for name, value in keys.items()
     }
-    return DriveTable.model_validate({"kind": kind, "amplitudes_nm": [1.0], **rounded})
+    return InputTable.model_validate({"kind": kind, "amplitudes_nm": [1.0], **rounded})
 
 
 def _rounded(value: float) -> float:
     return float(f"{value:.{_DIGITS + 1}g}")
 
 
-def _peak_between_samples(plan: CampaignPlan, drive: DriveTable, rig: Rig) -> float:
+def _peak_between_samples(plan: CampaignPlan, drive: InputTable, rig: Rig) -> float:
     """The peak, with a margin for samples that miss the peak of the fastest motion, rad."""
     fastest = max(
         drive.to_hz or 0.0,

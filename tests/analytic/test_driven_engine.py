@@ -14,11 +14,14 @@ from tests.marks import slow
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion, simulate_motions
 from tunnel_sim.files.rig_file import load_rig
-from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.forward import forward_motion
+from tunnel_sim.physics.input_moment import InputMoment
 from tunnel_sim.physics.run_settings import RodTwist, RunSettings
+from tunnel_sim.vocabulary.input_kinds import INPUTS
 from tunnel_sim.vocabulary.plan import AeroDerivatives, aerodynamic_damping, aerodynamic_stiffness
 from tunnel_sim.vocabulary.record import Array
+
+MOMENT, ROOT = INPUTS["moment_nm"], INPUTS["base_rad"]
 
 RATE, RIG = 100.0, load_rig()
 SPRING, INERTIA, DAMPING = 16.0, 0.1, 0.3  # a transient falls by e⁻¹·⁵ in a second
@@ -35,7 +38,7 @@ def driven(values: Array, *, steps: int = 10, hold: str = "linear", on_body: boo
         DAMPING,
         duration=values.size / RATE,
         timestep=1.0 / (RATE * steps),
-        drive=DriveMoment(TIME[: values.size], values, held=hold == "zero", on_body=on_body),
+        drive=InputMoment(TIME[: values.size], values, held=hold == "zero", kind=MOMENT if on_body else ROOT),
     )
 
 
@@ -103,7 +106,7 @@ def test_a_spring_whose_root_moves_acts_by_its_deflection(hold: str) -> None:
     run = replace(run, parameters={"stiffness_cubic": cubic, "stiffness_quadratic": quadratic})
     for found in (angle(run), forward_motion(RIG, run, RATE).angle):
         assert np.max(np.abs(found - expected)) < 1e-8
-    fixed = replace(run, drive=replace(run.drive, on_body=True))  # the same moment, without a moving root
+    fixed = replace(run, drive=replace(run.drive, kind=MOMENT))  # the same moment, without a moving root
     assert np.max(np.abs(angle(fixed) - expected)) > 1e-3
 
 
@@ -146,15 +149,15 @@ def test_a_delayed_input_is_of_second_order(hold: str, delay: float) -> None:
 @pytest.mark.parametrize(
     "drive",
     [
-        DriveMoment(TIME[1:], SMOOTH[1:]),
-        DriveMoment(TIME**1.01, SMOOTH),
-        DriveMoment(0.55 * TIME, SMOOTH),
-        DriveMoment(TIME[:1], SMOOTH[:1]),
+        InputMoment(TIME[1:], SMOOTH[1:]),
+        InputMoment(TIME**1.01, SMOOTH),
+        InputMoment(0.55 * TIME, SMOOTH),
+        InputMoment(TIME[:1], SMOOTH[:1]),
     ],
 )
 @pytest.mark.parametrize("held", [False, True])
 def test_samples_that_no_step_ends_at_act_by_their_means_over_the_steps(
-    drive: DriveMoment, held: bool
+    drive: InputMoment, held: bool
 ) -> None:
     run = replace(driven(SMOOTH), drive=replace(drive, held=held))
     found = forward_motion(RIG, run, RATE).angle

@@ -16,11 +16,14 @@ from tunnel_sim.effects import effect_class
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
 from tunnel_sim.files.rig_file import load_rig
-from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.forward import forward_motion
+from tunnel_sim.physics.input_moment import InputMoment
 from tunnel_sim.physics.run_settings import RodTwist, RunSettings
+from tunnel_sim.vocabulary.input_kinds import INPUTS
 from tunnel_sim.vocabulary.plan import AeroDerivatives, aerodynamic_damping, aerodynamic_stiffness
 from tunnel_sim.vocabulary.record import Array
+
+BY_MOMENT, ROOT = INPUTS["moment_nm"], INPUTS["base_rad"]
 
 RATE, RIG, DENSITY = 100.0, load_rig(), 1.2
 SPRING, INERTIA, DAMPING = 16.0, 0.1, 0.05
@@ -67,7 +70,7 @@ def run(
         duration=TIME.size / RATE,
         timestep=1.0 / (RATE * steps),
         rod_twist=RodTwist(COMPLIANCE, SHARE),
-        drive=DriveMoment(TIME, MOMENT, held=hold == "zero", on_body=on_body),
+        drive=InputMoment(TIME, MOMENT, held=hold == "zero", kind=BY_MOMENT if on_body else ROOT),
     )
 
 
@@ -97,7 +100,9 @@ def test_the_fits_predict_two_masses(hold: str, followed: bool, on_body: bool, t
     )
     # the spring's root moves by the angle whose moment it is
     unit = 1.0 if on_body else SPRING
-    drive = DriveMoment(TIME, MOMENT / unit, scale=unit, held=hold == "zero", on_body=on_body)
+    drive = InputMoment(
+        TIME, MOMENT / unit, scale=unit, held=hold == "zero", kind=BY_MOMENT if on_body else ROOT
+    )
     data = RunData(
         "r", np.zeros(TIME.size - 1), 1, 1.0 / RATE, NOISE, SPRING, 20.0, DENSITY, TIME[-1], drive=drive
     )
@@ -114,7 +119,7 @@ def test_the_fits_predict_two_masses(hold: str, followed: bool, on_body: bool, t
 
 def test_a_rod_too_stiff_to_ring_acts_by_its_first_order() -> None:
     """Steps of a fit would not follow its ringing; the rigid rod of the same first order moves alike."""
-    kind, drive = effect_class("rod_flexibility"), DriveMoment(TIME, MOMENT)
+    kind, drive = effect_class("rod_flexibility"), InputMoment(TIME, MOMENT)
     data = RunData(
         "r", np.zeros(TIME.size - 1), 1, 1.0 / RATE, NOISE, SPRING, 0.0, 0.0, TIME[-1], drive=drive
     )

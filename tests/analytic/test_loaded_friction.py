@@ -21,8 +21,8 @@ from tunnel_sim.effects import effect_from
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
 from tunnel_sim.files.rig_file import load_rig
-from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.forward import forward_motion
+from tunnel_sim.physics.input_moment import InputMoment
 
 RIG = load_rig()
 FREE = dataclasses.replace(
@@ -68,7 +68,7 @@ def test_the_error_falls_with_the_square_of_the_step():
 
 def test_a_body_without_gravity_is_held_by_the_drives_own_friction():
     """A constant moment M accelerates the body by (1 − μ) M: the load is the drive's."""
-    drive = DriveMoment(np.array([0.0, 9.0]), np.array([0.5, 0.5]), 1.0)
+    drive = InputMoment(np.array([0.0, 9.0]), np.array([0.5, 0.5]), 1.0)
     run = loaded(0.2, parameters={}, drive=drive, release_angle=0.0, duration=1.0)
     angle = forward_motion(RIG, run, 1000.0).angle
     time = np.arange(angle.size) / 1000.0
@@ -77,7 +77,7 @@ def test_a_body_without_gravity_is_held_by_the_drives_own_friction():
 
 def test_the_plugin_and_the_integrator_agree_under_gravity_and_a_drive():
     time = np.arange(0.0, 8.0, 0.01)
-    drive = DriveMoment(time, 0.8 * np.sin(5.0 * time), 1.0)
+    drive = InputMoment(time, 0.8 * np.sin(5.0 * time), 1.0)
     run = loaded(0.1, 0.01, drive=drive)
     engine = simulate_motion(build_model(RIG, run), 1000.0).angle
     assert np.max(np.abs(engine - forward_motion(RIG, run, 1000.0).angle)) < 1e-5

@@ -9,14 +9,17 @@ import pytest
 
 from tests.analytic.law_cases import RIG
 from tests.marks import slow
-from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.forward import forward_run, integrate
+from tunnel_sim.physics.input_moment import InputMoment
 from tunnel_sim.physics.moment_law import parameter_vector
 from tunnel_sim.physics.rod_modes import Ringing, slow_motion
 from tunnel_sim.physics.run_settings import RodTwist, RunSettings, SettingsTable, spring_end_angle
 from tunnel_sim.physics.steps import compensated, fit_stride
+from tunnel_sim.vocabulary.input_kinds import INPUTS
 from tunnel_sim.vocabulary.plan import AeroDerivatives
 from tunnel_sim.vocabulary.record import Array
+
+MOMENT, ROOT = INPUTS["moment_nm"], INPUTS["base_rad"]
 
 INTERVAL = 4e-3
 SAMPLES = 2501
@@ -84,7 +87,7 @@ def test_nonlinear_terms_err_far_less_than_the_rod_does(terms, tolerance):
 def test_the_input_of_a_driven_run_excites_both_oscillations(terms, tolerance, on_body):
     time = INTERVAL * np.arange(SAMPLES)
     values = np.repeat(np.random.default_rng(3).standard_normal(SAMPLES // 25 + 1), 25)[:SAMPLES]
-    drive = DriveMoment(time, values, on_body=on_body, held=True)
+    drive = InputMoment(time, values, kind=MOMENT if on_body else ROOT, held=True)
     settings = replace(run(speed=0.0, **terms), drive=drive)
     error = np.max(np.abs(separated(settings) - followed(settings)))
     rigid = replace(settings, rod_twist=None, release_angle=spring_end_angle(settings))

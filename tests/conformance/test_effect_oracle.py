@@ -39,8 +39,8 @@ from tunnel_sim.effects.sensor import InputDelay
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
 from tunnel_sim.files.rig_file import load_rig
-from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.forward import forward_motion
+from tunnel_sim.physics.input_moment import InputMoment
 from tunnel_sim.vocabulary.plan import SensorModel
 
 RIG = load_rig()
@@ -223,7 +223,7 @@ def test_every_effect_is_compared() -> None:
 def test_a_delayed_input_matches_the_equation_between_its_kinks(delay: float, held: bool) -> None:
     run, time = replace(RUN, duration=1.5), np.arange(150) / 100.0
     values = np.random.default_rng(5).standard_normal(time.size)  # a kink or jump at every sample
-    driven = replace(settings(run), drive=DriveMoment(time, values, held=held))
+    driven = replace(settings(run), drive=InputMoment(time, values, held=held))
     found = []
     for late in (delay, 0.0):
         chain = EffectChain(driven, (InputDelay(late),), (None,))
@@ -236,7 +236,7 @@ def test_a_delayed_input_matches_the_equation_between_its_kinks(delay: float, he
 def test_a_motion_is_continuous_in_the_delay_of_its_input() -> None:
     time = np.arange(150) / 100.0
     values = np.random.default_rng(6).standard_normal(time.size)
-    driven = replace(settings(replace(RUN, duration=1.5)), drive=DriveMoment(time, values, held=True))
+    driven = replace(settings(replace(RUN, duration=1.5)), drive=InputMoment(time, values, held=True))
 
     def moved(delay: float) -> np.ndarray:
         chain = EffectChain(driven, (InputDelay(delay),), (None,))

@@ -25,8 +25,8 @@ from tests.reference.linear_rig import response_of_a_loose_body
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.dimensions import dimension
-from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.record import Array, Record
 from tunnel_sim.vocabulary.rig import JointLaw, Term
 
@@ -63,7 +63,7 @@ def driven_run(number: int) -> Run:
     given = np.sin(lines + rng.uniform(0.0, 2.0 * np.pi, lines.shape[1])).sum(axis=1)
     given *= 0.5 / given.std()
     angle = response_of_a_loose_body(given, 1.0 / RATE, INERTIA, DAMPING) + rng.normal(0.0, NOISE, TIME.size)
-    return Run(f"r{number}", Record(TIME, angle), 0.0, drive=Drive("moment_nm", given))
+    return Run(f"r{number}", Record(TIME, angle), 0.0, drive=Input("moment_nm", given))
 
 
 def campaign(*runs: Run) -> Campaign:

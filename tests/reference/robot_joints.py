@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive, Hold
-from tunnel_sim.vocabulary.inputs import InputColumn
+from tunnel_sim.vocabulary.input_kinds import InputColumn
+from tunnel_sim.vocabulary.inputs import Hold, Input
 from tunnel_sim.vocabulary.record import Array, Record
 
 RATE, NOISE, GEAR = 250.0, 2e-4, 20.0
@@ -96,6 +96,6 @@ def robot_campaign(
         late = np.concatenate([np.full(delay, values[0]), values[: values.size - delay]])
         reading = positions(xml, late, hold, start=(start, 0.0), column=column)
         reading = reading + np.random.default_rng([seed, 1]).normal(0.0, NOISE, TIME.size)
-        drive = Drive(column, values, hold, gain)
+        drive = Input(column, values, hold, gain)
         runs.append(Run(f"r{seed + 1}", Record(TIME, reading), 0.0, drive=drive))
     return Campaign("robot", RigProperties(), SensorProperties(RATE), tuple(runs))

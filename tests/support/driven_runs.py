@@ -14,8 +14,8 @@ from typing import Literal
 import numpy as np
 
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive, Hold
-from tunnel_sim.vocabulary.inputs import InputColumn
+from tunnel_sim.vocabulary.input_kinds import InputColumn
+from tunnel_sim.vocabulary.inputs import Hold, Input
 from tunnel_sim.vocabulary.record import Array, Record
 
 RATE, COUNT, STEPS = 100.0, 1200, 8  # Hz, samples of a run, steps of a sample
@@ -176,7 +176,7 @@ def exact(name: str, planted: Planted = NOTHING) -> Campaign:
         if planted.mode:
             reading = reading + states[:, 2]
         gain = GAIN if kind.known_gain else None
-        drive = None if column is None else Drive(column, values, kind.hold, gain)
+        drive = None if column is None else Input(column, values, kind.hold, gain)
         stiffness, release = spring if kind.stated else None, None if column else 0.2
         record = Record(time, reading + ZERO)
         runs.append(Run(f"r{place}", record, 0.0, stiffness, release_angle=release, drive=drive))

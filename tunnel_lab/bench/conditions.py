@@ -20,8 +20,8 @@ from tunnel_sim.files.reading import read_json
 from tunnel_sim.files.toml_input import load_toml, one_line, validate
 from tunnel_sim.files.writing import write_json, write_whole
 from tunnel_sim.vocabulary.campaign import needs_density
-from tunnel_sim.vocabulary.drive import without_spring_needs_drive
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.inputs import without_spring_needs_input
 
 Cells = dict[str, dict[str, str]]
 """Texts by run and key; those of the rig under `RIG`."""
@@ -121,7 +121,7 @@ def save(session: Session, cells: Cells) -> Words:
     drives = {run.id: run.drive for run in read_campaign(session.campaign).runs} if loose else {}
     for row in loose:
         try:
-            without_spring_needs_drive(0.0, drives[row], f"run '{row}'")
+            without_spring_needs_input(0.0, drives[row], f"run '{row}'")
         except TunnelError as error:
             wrong[row, key] = str(error)
     if wrong:

@@ -18,7 +18,7 @@ from tunnel_lab.report.import_table import parts_table
 from tunnel_lab.terminal.arguments import LeaveOutOption, ending, output_file, refuse_unwritable_files
 from tunnel_lab.terminal.outputs import say, say_sentence, say_written, show
 from tunnel_sim.vocabulary.errors import TunnelError, counted, one_of
-from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS
+from tunnel_sim.vocabulary.input_kinds import INPUT_COLUMNS
 
 if TYPE_CHECKING:
     from tunnel_sim.files.importing.choices import ImportChoices

@@ -160,7 +160,7 @@ def with_effects(
         type(alike[0]).on_runs(runs, stated, alike, own)
     for name, relative in (deviations or {}).items():
         runs.deviate(name, relative)
-    runs.change_drives(
+    runs.change_inputs(
         runs.spring_stiffness.tolist(),
         lambda spring, drive: drive if drive.on_body else replace(drive, scale=spring),
     )

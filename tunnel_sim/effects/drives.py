@@ -15,7 +15,7 @@ from typing import Self
 from tunnel_sim.effects.base import Drawn, Effect
 from tunnel_sim.effects.parameters import Circumstances, Trial, parameter
 from tunnel_sim.effects.traits import Text
-from tunnel_sim.physics.drive import DriveMoment
+from tunnel_sim.physics.input_moment import InputMoment
 from tunnel_sim.physics.run_settings import SettingsTable
 
 _FRANKLIN = "Franklin, Powell & Emami-Naeini, Feedback Control of Dynamic Systems, 8th ed., Pearson 2019"
@@ -44,10 +44,10 @@ class ActuatorEffect(Effect):
     ) -> None:
         """Change the actuators; a free decay has none."""
         del stated, drawn
-        runs.change_drives(effects, cls._exerted)
+        runs.change_inputs(effects, cls._exerted)
 
-    def _exerted(self, drive: DriveMoment) -> DriveMoment:
-        if self.is_null or not drive.through_actuator:
+    def _exerted(self, drive: InputMoment) -> InputMoment:
+        if self.is_null or not drive.kind.by_actuator:
             return drive
         own = {info.name: getattr(self, info.name) for info in self.parameters()}
         return dataclasses.replace(drive, actuator=dataclasses.replace(drive.actuator, **own))

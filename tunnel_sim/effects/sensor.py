@@ -21,8 +21,8 @@ from tunnel_sim.effects.capabilities import (
 )
 from tunnel_sim.effects.evidence import Residuals, Sought
 from tunnel_sim.effects.parameters import EQUATION, Circumstances, Trial, exponent, parameter, ramp, settling
-from tunnel_sim.physics.drive import DriveMoment, Same
 from tunnel_sim.physics.forward import backlash
+from tunnel_sim.physics.input_moment import InputMoment, Same
 from tunnel_sim.physics.run_settings import RunSettings, SettingsTable
 from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Array, read_only
@@ -481,7 +481,7 @@ class InputDelay(InputClock):
     ) -> None:
         """Shift the inputs; a free decay has none."""
         del stated, drawn
-        runs.change_drives(effects, cls._later)
+        runs.change_inputs(effects, cls._later)
 
-    def _later(self, drive: DriveMoment) -> DriveMoment:
+    def _later(self, drive: InputMoment) -> InputMoment:
         return drive if self.is_null else dataclasses.replace(drive, delay=drive.delay + self.delay)

@@ -17,8 +17,8 @@ from tunnel_sim.effects.chain import read_motion
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate, simulate_motion, simulate_motions
 from tunnel_sim.files.rig_file import load_rig
-from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.forward import forward_motion
+from tunnel_sim.physics.input_moment import InputMoment
 from tunnel_sim.physics.run_settings import Motion, RunSettings
 from tunnel_sim.physics.steps import follow_fastest
 from tunnel_sim.vocabulary.dimensions import beside
@@ -41,7 +41,7 @@ WIND_ON = RunSettings(
 )  # fmt: skip
 WIND_OFF = replace(WIND_ON, wind_speed=0.0)
 _TIME = np.arange(0.0, WIND_ON.duration, 1.0 / SENSOR.sample_rate)
-DRIVE = DriveMoment(_TIME, np.sin(2.0 * np.pi * (1.0 + 2.0 * _TIME) * _TIME))
+DRIVE = InputMoment(_TIME, np.sin(2.0 * np.pi * (1.0 + 2.0 * _TIME) * _TIME))
 """Input for an effect that acts on driven runs only: a chirp over the resonance, N m."""
 
 

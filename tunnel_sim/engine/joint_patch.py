@@ -17,7 +17,7 @@ from tunnel_sim.engine.joint_model import JointModel
 from tunnel_sim.engine.model_files import engine_refusals
 from tunnel_sim.engine.simulate import no_log
 from tunnel_sim.files.reading import check_count
-from tunnel_sim.physics.drive import DriveMoment
+from tunnel_sim.physics.input_moment import InputMoment
 from tunnel_sim.physics.run_settings import Motion
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, shown
@@ -41,7 +41,7 @@ class Start:
     time: float
     angle: float
     rate: float
-    drive: DriveMoment | None = None
+    drive: InputMoment | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from tunnel_sim.effects.chain import read_motion
 from tunnel_sim.effects.drives import ActuatorEffect
 from tunnel_sim.engine.simulate import Progress, simulate_motions
 from tunnel_sim.files.rig_file import load_rig
-from tunnel_sim.physics.drive import DriveMoment
+from tunnel_sim.physics.input_moment import InputMoment
 from tunnel_sim.physics.run_settings import REFERENCE_SPEED, RunSettings
 from tunnel_sim.vocabulary.between_runs import along, between_runs, together
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties, mean_wind_speed
@@ -166,14 +166,8 @@ def run_settings(
     given, moment = condition.drive, None
     if given is not None:
         assert sample_rate is not None
-        moment = DriveMoment(
-            np.arange(given.values.size) / sample_rate,
-            given.values,
-            scale=given.kind.true_scale(condition.gain, condition.spring_stiffness, truth.yaw_inertia),
-            held=given.held,
-            on_body=given.on_body,
-            by_actuator=given.kind.by_actuator,
-        )
+        scale = given.kind.true_scale(condition.gain, condition.spring_stiffness, truth.yaw_inertia)
+        moment = InputMoment.of(given, np.arange(given.values.size) / sample_rate, scale)
     return RunSettings(
         spring_stiffness=condition.spring_stiffness,
         derivatives=AeroDerivatives(truth.cn_beta, truth.cn_r),

@@ -39,9 +39,9 @@ from tunnel_sim.vocabulary.campaign import (
     Zero,
     needs_density,
 )
-from tunnel_sim.vocabulary.drive import DRIVE_KEYS, Drive, Hold, without_spring_needs_drive
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_of
-from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS, INPUTS, InputColumn
+from tunnel_sim.vocabulary.input_kinds import INPUT_COLUMNS, INPUTS, InputColumn
+from tunnel_sim.vocabulary.inputs import INPUT_KEYS, Hold, Input, without_spring_needs_input
 
 CAMPAIGN_FILE = "campaign.toml"
 NO_CAMPAIGN = f"name a folder that holds a {CAMPAIGN_FILE}"
@@ -232,12 +232,12 @@ def read_campaign(folder: Path | str, progress: Callable[[int, int], None] | Non
         drive = None
         if held.input is not None and held.input_column is not None:
             _check_keys(run, held.input_column, where)
-            drive = Drive(held.input_column, held.input, run.drive_hold, run.drive_gain, run.servo_kv)
-        elif keys := [key for key in DRIVE_KEYS if getattr(run, key) is not None]:
+            drive = Input(held.input_column, held.input, run.drive_hold, run.drive_gain, run.servo_kv)
+        elif keys := [key for key in INPUT_KEYS if getattr(run, key) is not None]:
             remedy = f"add a column {one_of(INPUT_COLUMNS)} to the run file, or leave the key out"
             raise TunnelError(f"{keys[0]} without an input column", where=where, remedy=remedy)
         record = checked_record(time_s, held.reading, held.column, sensor, run.release_angle, where, drive)
-        without_spring_needs_drive(run.spring_stiffness, drive, where)
+        without_spring_needs_input(run.spring_stiffness, drive, where)
         conditions = run.spring_stiffness, run.air_density, run.release_angle
         runs.append(Run(run.id, record, run.wind_speed, *conditions, drive=drive))
         samples += record.time_s.size
@@ -315,7 +315,7 @@ def write_campaign(
         where = run_place(folder, run.id)
         time_s, yaw = run.record.time_s, run.record.yaw_rad
         checked_record(time_s, yaw, "yaw_rad", campaign.sensor, run.release_angle, where, run.drive)
-        without_spring_needs_drive(run.spring_stiffness, run.drive, where)
+        without_spring_needs_input(run.spring_stiffness, run.drive, where)
     truth_text = None if truth is None else json_text(truth)
     with whole_folder(folder, replace=overwrite) as partial:
         (partial / RUN_FOLDER).mkdir()

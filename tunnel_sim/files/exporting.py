@@ -15,9 +15,9 @@ from tunnel_sim.files.run_files import COLUMNS
 from tunnel_sim.files.toml_input import shown
 from tunnel_sim.files.writing import write_encoded
 from tunnel_sim.vocabulary.campaign import Campaign, Run
-from tunnel_sim.vocabulary.drive import DRIVE_KEYS
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, library
-from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS
+from tunnel_sim.vocabulary.input_kinds import INPUT_COLUMNS
+from tunnel_sim.vocabulary.inputs import INPUT_KEYS
 from tunnel_sim.vocabulary.text_cells import as_text_cell
 
 _SHEET_ROWS = 1_048_576
@@ -84,7 +84,7 @@ def _as_mat(campaign: Campaign, stream: BinaryIO, _where: str) -> None:
 
 
 def _condition_keys(campaign: Campaign) -> tuple[str, ...]:
-    return (*RUN_KEYS, *DRIVE_KEYS) if _input_columns(campaign) else RUN_KEYS
+    return (*RUN_KEYS, *INPUT_KEYS) if _input_columns(campaign) else RUN_KEYS
 
 
 def _cells(campaign: Campaign, run: Run) -> dict[str, float | str | None]:

@@ -15,7 +15,7 @@ from typing import Annotated, Literal, Protocol, TypeVar
 import numpy as np
 from pydantic import AfterValidator, Field
 
-from tunnel_sim.files.plan_drive import DriveTable, check_drive, drive_of_file, drive_of_run
+from tunnel_sim.files.plan_input import InputTable, check_input_table, input_of_file, input_of_run
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.files.scatter_tables import RepeatabilityTable, ScatterTable
@@ -31,8 +31,8 @@ from tunnel_sim.files.toml_input import (
     validate,
 )
 from tunnel_sim.vocabulary import limits
-from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.plan import (
     DEFAULT_SAMPLE_RATE,
     CampaignPlan,
@@ -118,7 +118,7 @@ class PlanDocument(StrictModel):
     repeatability: RepeatabilityTable = Field(
         default=RepeatabilityTable(), description="a [repeatability] table"
     )
-    drive: DriveTable | None = optional("a [drive] table with kind and amplitudes")
+    drive: InputTable | None = optional("a [drive] table with kind and amplitudes")
     effects: list[EffectTable] = Field(default=[], description="[[effects]] tables")
 
     @property
@@ -143,7 +143,7 @@ def read_plan(path: Path) -> PlanDocument:
         raise TunnelError("'release_angles_deg' is empty or missing", where=shown(path), remedy=remedy)
     check_size(run_count(plan, driven), plan.duration, plan.sample_rate, shown(path))
     if plan.drive is not None:
-        check_drive(plan.drive, plan.samples, plan.sample_rate, f"{shown(path)}, [drive]")
+        check_input_table(plan.drive, plan.samples, plan.sample_rate, f"{shown(path)}, [drive]")
     return plan
 
 
@@ -227,7 +227,7 @@ def plan_from(document: PlanDocument, rig: Rig, where: str, folder: Path = Path(
     table, time, numbers = document.drive, np.arange(document.samples) / document.sample_rate, count()
     given = None
     if table is not None and table.file is not None:
-        given = drive_of_file(folder / table.file, time, table, f"{where}, [drive] file '{table.file}'")
+        given = input_of_file(folder / table.file, time, table, f"{where}, [drive] file '{table.file}'")
     for number in document.springs:
         if number not in rig.springs:
             remedy = f"use one of {', '.join(map(str, rig.springs))}, or give spring_stiffness in N m/rad"
@@ -235,7 +235,7 @@ def plan_from(document: PlanDocument, rig: Rig, where: str, folder: Path = Path(
     springs = [(f"s{number}", rig.springs[number]) for number in document.springs]
     springs += [(f"k{_short(stiffness)}", stiffness) for stiffness in document.spring_stiffness]
 
-    def starts() -> Iterator[tuple[str, float, Drive | None]]:
+    def starts() -> Iterator[tuple[str, float, Input | None]]:
         """End of the id, release angle (rad) and input of the runs of a spring and a speed, free decays first."""
         repeats = [f"-{number + 1}" if document.repeats > 1 else "" for number in range(document.repeats)]
         for angle in document.release_angles_deg:
@@ -245,7 +245,7 @@ def plan_from(document: PlanDocument, rig: Rig, where: str, folder: Path = Path(
                 if amplitude is None or table is None:
                     yield f"file{repeat}", 0.0, given
                 else:
-                    drive = drive_of_run(table, amplitude, next(numbers), time)
+                    drive = input_of_run(table, amplitude, next(numbers), time)
                     yield f"d{_short(amplitude)}{repeat}", 0.0, drive
 
     stated = document.truth.model_dump(exclude_none=True)

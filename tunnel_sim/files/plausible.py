@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import SensorProperties
-from tunnel_sim.vocabulary.drive import Drive, checked_drive
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.inputs import Input, checked_input
 from tunnel_sim.vocabulary.quantities import Hertz, Rad, Readings, Times
 from tunnel_sim.vocabulary.record import Record, count_cycles
 
@@ -116,7 +116,7 @@ def checked_record(
     sensor: SensorProperties,
     release_angle: Rad | None,
     where: str,
-    drive: Drive | None = None,
+    drive: Input | None = None,
 ) -> Record:
     """The record of a run, unless it or its input is refused."""
     increasing_times(time_s, sensor.sample_rate, where)
@@ -155,7 +155,7 @@ def checked_record(
     if judged:
         _check(f"time_s steps by {step:.3g} s", step, RANGES["step"], where)
     if drive is not None:
-        checked_drive(drive, record, where, judged=judged)
+        checked_input(drive, record, where, judged=judged)
     if drive is not None or not judged:
         return record
     per_cycle = reading.size / cycles

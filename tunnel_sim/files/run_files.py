@@ -21,9 +21,9 @@ from tunnel_sim.forks import polars_works
 from tunnel_sim.sandbox import Message, Work
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import Quantity
-from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError, one_line, one_of
-from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS, WITHOUT_UNIT, InputColumn
+from tunnel_sim.vocabulary.input_kinds import INPUT_COLUMNS, WITHOUT_UNIT, InputColumn
+from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.quantities import PerSample, Readings, Times
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -170,7 +170,7 @@ def _parts(values: Iterable[Array]) -> list[memoryview]:
 
 
 def table_bytes(
-    record: Record, path: Path, quantity: Quantity = "angle", drive: Drive | None = None
+    record: Record, path: Path, quantity: Quantity = "angle", drive: Input | None = None
 ) -> bytes:
     """The content of a run file, in the format of the path, with readings in radians, to the last digit."""
     check_polars()

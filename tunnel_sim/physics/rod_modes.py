@@ -16,8 +16,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.forward import forward_run
+from tunnel_sim.physics.input_moment import InputMoment
 from tunnel_sim.physics.run_settings import RodTwist, RunSettings, spring_end_angle
 from tunnel_sim.vocabulary.plan import aerodynamic_damping, aerodynamic_stiffness
 from tunnel_sim.vocabulary.quantities import Angles, Rates, Seconds, Times
@@ -41,7 +41,7 @@ class Response:
         residue: of the angle's transfer function at the root, rad/(N m s).
     """
 
-    drive: DriveMoment
+    drive: InputMoment
     root: complex
     residue: complex
 

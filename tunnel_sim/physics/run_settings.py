@@ -15,7 +15,7 @@ from typing import Any, Generic, TypeVar, cast
 
 import numpy as np
 
-from tunnel_sim.physics.drive import DriveMoment
+from tunnel_sim.physics.input_moment import InputMoment
 from tunnel_sim.physics.moment_law import operation_names, parameter_names
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
@@ -136,7 +136,7 @@ class SettingsTable:
     series: list[Mapping[str, Series]]
     rod_twist: list[RodTwist | None]
     program: list[tuple[float, ...]]
-    drive: list[DriveMoment | None]
+    drive: list[InputMoment | None]
 
     @classmethod
     def empty(cls, count: int) -> SettingsTable:
@@ -242,12 +242,12 @@ class SettingsTable:
                 self.series[place] = {**given, name: Series(values, one.interval)}
 
     @property
-    def inputs(self) -> dict[int, DriveMoment]:
+    def inputs(self) -> dict[int, InputMoment]:
         """The inputs of the driven runs by their places."""
         return {place: drive for place, drive in enumerate(self.drive) if drive is not None}
 
-    def change_drives(
-        self, by: Sequence[Hashable], changed: Callable[[Any, DriveMoment], DriveMoment]
+    def change_inputs(
+        self, by: Sequence[Hashable], changed: Callable[[Any, InputMoment], InputMoment]
     ) -> None:
         """Change the inputs of the driven runs; equal changes of one input give one object.
 
@@ -255,7 +255,7 @@ class SettingsTable:
             by: what changes the input of every run.
             changed: the input after a change.
         """
-        known: dict[tuple[Hashable, DriveMoment], DriveMoment] = {}
+        known: dict[tuple[Hashable, InputMoment], InputMoment] = {}
         for place, drive in self.inputs.items():
             change = by[place]
             if (change, drive) not in known:
@@ -365,7 +365,7 @@ class RunSettings:
     series: _Object[Mapping[str, Series]] = _Object()
     rod_twist: _Object[RodTwist | None] = _Object()
     program: _Object[tuple[float, ...]] = _Object()
-    drive: _Object[DriveMoment | None] = _Object()
+    drive: _Object[InputMoment | None] = _Object()
     mean_speed: _Number = _Number(REFERENCE_SPEED)
 
     def __post_init__(self) -> None:

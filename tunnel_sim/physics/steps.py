@@ -19,7 +19,7 @@ from math import ceil, inf, isfinite, log, pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_sim.physics.drive import DriveMoment
+from tunnel_sim.physics.input_moment import InputMoment
 from tunnel_sim.physics.run_settings import RunSettings, SettingsTable, column_places
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import aerodynamic_damping, aerodynamic_stiffness
@@ -80,7 +80,7 @@ def fit_substeps(runs: SettingsTable, interval: DurationPerRun) -> NDArray[np.in
     return np.ceil(interval / longest).astype(np.int64)
 
 
-def input_substeps(least: int, interval: Seconds, drive: DriveMoment) -> int:
+def input_substeps(least: int, interval: Seconds, drive: InputMoment) -> int:
     """The number of steps in an interval, at least a given one, that begin at the samples of an input if they can.
 
     Args:

@@ -8,9 +8,9 @@ from statistics import fmean
 from typing import TYPE_CHECKING, Literal
 
 from tunnel_sim.vocabulary.between_runs import Repeatability as Repeatability
-from tunnel_sim.vocabulary.drive import Drive, checked_drive, refuse_several_gains, refuse_untreated
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, installing
-from tunnel_sim.vocabulary.inputs import InputColumn, KnownGain
+from tunnel_sim.vocabulary.input_kinds import InputColumn, KnownGain
+from tunnel_sim.vocabulary.inputs import Input, checked_input, refuse_several_gains, refuse_untreated
 from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Record
 from tunnel_sim.vocabulary.rig import JointLaw, Rig
@@ -102,7 +102,7 @@ class Run:
     spring_stiffness: float | None = None
     air_density: float | None = None
     release_angle: float | None = None
-    drive: Drive | None = None
+    drive: Input | None = None
     clock_s: float = field(default=0.0, compare=False)
 
     @property
@@ -212,7 +212,7 @@ class Campaign(RunGroups[Run]):
     repeatability: Repeatability | None = None
 
     @property
-    def inputs(self) -> tuple[Drive, ...]:
+    def inputs(self) -> tuple[Input, ...]:
         """The inputs of the driven runs."""
         return tuple(run.drive for run in self.runs if run.drive is not None)
 
@@ -237,7 +237,7 @@ class Campaign(RunGroups[Run]):
         for run in self.runs:
             if run.drive is not None:
                 where = f"{self.name}, run '{run.id}'"
-                checked_drive(run.drive, run.record, where, judged=judged)
+                checked_input(run.drive, run.record, where, judged=judged)
                 refuse_untreated(run.drive, run.spring_stiffness, quantity, where, wind_on=run.wind_on)
         refuse_several_gains(self.inputs, self.name)
         return self

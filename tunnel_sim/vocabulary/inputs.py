@@ -1,322 +1,188 @@
-"""The kinds of input of a driven run: their meaning, their effect on the body, and a run's statements on them.
-
-A kind is one type; the columns of run files, imports, plans, fits and plots come from its fields. The moment
-on the body is on the right-hand side of Izz β̈ + C β̇ + K β = M, with M and β positive in the same direction.
-"""
+"""The input of a driven run at the samples of its record, and the checks that refuse bad inputs."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
-from math import pi
-from typing import TYPE_CHECKING, ClassVar, Literal, overload
+from typing import Literal
 
-if TYPE_CHECKING:
-    from tunnel_sim.vocabulary.record import Array  # commands answer before NumPy is loaded
+import numpy as np
 
-InputColumn = Literal[
-    "moment_nm", "drive", "base_rad", "command_rad", "base_acceleration_rad_s2", "base_acceleration_m_s2"
-]
-"""The columns of a run file that may hold its input, as `INPUTS` describes them."""
+from tunnel_sim.vocabulary.columns import read_only_column
+from tunnel_sim.vocabulary.errors import TunnelError, one_of
+from tunnel_sim.vocabulary.input_kinds import INPUT_COLUMNS, INPUTS, InputColumn, InputKind
+from tunnel_sim.vocabulary.record import Array, Record
 
-_MOMENTS = ("nm", "n m", "n-m", "n*m", "n·m", "newton metre", "newton meter", "n_m")
-_BASE = re.compile(r"(?<![a-z])(base|root)(?![a-z])", re.IGNORECASE)
-_SHAKEN = re.compile(r"(?<![a-z])(base|root|table|floor|ground|shaker|platform)(?![a-z])", re.IGNORECASE)
-_ACCELERATION = re.compile(r"(?<![a-z])(acc|accel|acceleration|beschleunigung)(?![a-z])", re.IGNORECASE)
-_ANGLES: Mapping[str, float] = {
-    "rad": 1.0, "mrad": 1e-3, "deg": pi / 180.0, "gon": pi / 200.0, "turns": 2.0 * pi,
-}  # fmt: skip
-_TURNING: Mapping[str, float] = {"rad/s2": 1.0, "deg/s2": pi / 180.0}
-_COMMAND = re.compile(
-    r"(?i)(?<![a-z])(goal|target|set[ _]?point|soll(wert|winkel|position|lage)?|desired|des|ref|reference|"
-    r"demand(ed)?|commanded|(command|cmd)(?=[ _]*[a-zθψφβ])|(?<=[a-zθψφβ][ _])(command|cmd|sp|set))(?![a-z])"
-    r"|^(goal|target|desired|ref|cmd)(pos|position|angle|yaw|theta|q)(?![a-z])|(?<![a-z])q(des|ref|cmd)(?![a-z])"
-)
-_NOT_ANGLE = re.compile(
-    r"(?i)vel|speed|rate|gyro|omega|dot|acc|torque|moment|effort|tau|current|force|volt|pwm|duty|power|wind|tunnel|"
-    r"temp|press|flow|fan|load|kp|kd|ki|gain|time|mass"
-)
-_JOINED = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
-_G = 9.80665  # m/s², standard gravity, the unit of accelerometers
-_ALONG: Mapping[str, float] = {"m/s2": 1.0, "mm/s2": 1e-3, "cm/s2": 1e-2, "g": _G, "mg": 1e-3 * _G}
-_PLAIN = str.maketrans({"²": "2", "^": None, "_": "/", " ": None})
+Hold = Literal["zero", "linear"]
+"""Between samples the input keeps its value, or is linear."""
+
+HOLDS: tuple[Hold, ...] = ("zero", "linear")
+"""The holds by their order, 0 and 1."""
+
+INPUT_KEYS = ("drive_hold", "drive_gain", "servo_kv")
+"""The keys of a run that state its input."""
+
+_CONSTANT = 1e-9  # of the largest value, within which an input is constant
+_ITSELF = 1e-7  # share of the variance by which an input must differ from every multiple of the response
+_FLAT = 3  # equal extreme values in a row that a clipped input has
+_CLIPPED = 0.01  # share of the samples at an extreme, from which an input is clipped
+_LEVELS = 0.6  # share of the samples at both extremes, above which they are the levels of a square wave
+_NEIGHBOURS = 5.0  # samples at the extreme for each one within a hundredth of the range of it
 
 
-@dataclass(frozen=True)
-class KnownGain:
-    """The gain of an input over the inertia, where the motion alone determines it: per_stiffness · k + constant.
+@dataclass(frozen=True, eq=False)
+class Input:
+    """The input of a run at the samples of its record.
 
     Args:
-        per_stiffness: rad/s² per unit of the input, for each 1/s² of stiffness over the inertia.
-        constant: rad/s² per unit of the input.
+        column: of a run file, which determines the kind of input (`INPUTS`).
+        values: at the times of the record, shape (n,), in the unit of the column.
+        hold: between the samples; None: not stated, and assumed linear.
+        gain: N m per unit, for kinds that take one; for ``base_acceleration_m_s2`` mass times arm, kg m. None
+            where it is not stated.
+        servo_kv: for ``command_rad``, the servo's damping against the ground, N m s/rad; None where it is not
+            stated. The servo's kp is the stiffness of the run's spring.
     """
 
-    per_stiffness: float = 0.0
-    constant: float = 0.0
+    column: InputColumn
+    values: Array
+    hold: Hold | None = None
+    gain: float | None = None
+    servo_kv: float | None = None
 
-    @overload
-    def at(self, stiffness: float) -> float: ...
-    @overload
-    def at(self, stiffness: Array) -> Array: ...
-    def at(self, stiffness: float | Array) -> float | Array:
-        """The gain, rad/s² per unit of the input, with a stiffness over the inertia in 1/s², of any shape."""
-        return self.per_stiffness * stiffness + self.constant
+    def __post_init__(self) -> None:
+        """Copy the values, check that they are numbers, and make them read-only."""
+        object.__setattr__(self, "values", read_only_column(self.values, self.column, "Input"))
+
+    @property
+    def stated(self) -> dict[str, float | str | None]:
+        """Its stated properties by the key of the format (`INPUT_KEYS`), in its units; None where not stated."""
+        return {"drive_hold": self.hold, "drive_gain": self.gain, "servo_kv": self.servo_kv}
+
+    @property
+    def held(self) -> bool:
+        """Whether the input keeps its value between samples; else it is linear."""
+        return self.hold == "zero"
+
+    @property
+    def kind(self) -> InputKind:
+        """The kind of input."""
+        return INPUTS[self.column]
+
+    @property
+    def on_body(self) -> bool:
+        """Whether it is a moment on the body; else it acts through the spring."""
+        return not self.kind.of_spring
+
+    @property
+    def gain_stated(self) -> bool:
+        """Whether its moment on the body follows from the run's statements, without an inertia or a fitted gain."""
+        return self.kind.gain(self.gain, 1.0) is not None
 
 
-class Input:
-    """A kind of input.
+def checked_input(drive: Input, record: Record, where: str, *, judged: bool = True) -> None:
+    """Refuse an input that cannot belong to its record; where ``judged``, also one that looks clipped."""
+    values, name = drive.values, drive.column
+    if values.shape != record.yaw_rad.shape:
+        what = f"the input {name} has {values.size} samples, the record {record.yaw_rad.size}"
+        remedy = "give the input at the times of the record, one value for each sample"
+        raise TunnelError(what, where=where, remedy=remedy)
+    if not np.isfinite(values).all():
+        remedy = "give all its values"
+        raise TunnelError(f"the input {name} contains NaN or an infinity", where=where, remedy=remedy)
+    span = float(np.ptp(values))
+    if span <= _CONSTANT * float(np.abs(values).max()):
+        remedy = f"leave the column out if the run is a free decay, or record what drives it in {name}"
+        raise TunnelError(f"the input {name} is constant", where=where, remedy=remedy)
+    x, y = values - values.mean(), record.yaw_rad - record.yaw_rad.mean()
+    alike = float(x @ y) ** 2 / max(float(x @ x) * float(y @ y), 1e-300)
+    if 1.0 - alike < _ITSELF:
+        what = f"the input {name} is proportional to the response"
+        remedy = f"record what drives the body in {name}, not the sensor's reading"
+        raise TunnelError(what, where=where, remedy=remedy)
+    ends = (float(values.min()), float(values.max()))
+    between = (values[1:] != ends[0]) & (values[1:] != ends[1])
+    if not judged or between.mean() < 1.0 - _LEVELS:
+        return
+    if (
+        np.mean((values[1:] == values[:-1])[between]) > 0.5
+    ):  # it stays at every level, not only at the extremes
+        return
+    # A clipped input is often at an extreme for several samples, and seldom near it.
+    for end in ends:
+        there = values == end
+        count = int(np.count_nonzero(there))
+        near = int(np.count_nonzero(np.abs(values - end) < 0.01 * span)) - count
+        flat = there[2:] & there[1:-1] & there[:-2]
+        stands = int(np.count_nonzero(flat)) * _FLAT > count
+        if count > max(_CLIPPED * values.size, _FLAT) and stands and count > _NEIGHBOURS * max(near, 1):
+            raise TunnelError(
+                f"the input {name} saturates: {_CLIPPED:.0%} or more of the record is at its extreme value",
+                where=where,
+                remedy="record the input in a wider range; where the actuator itself saturates, state "
+                "plausible = false under [sensor] to keep it",
+            )
 
-    Traits, with defaults that a kind overrides:
 
-    - ``column``: of a run file; ``unit``: of its values.
-    - ``meaning``: its description, a clause of an import; ``noun``: a word for it on an axis.
-    - ``of_spring``: whether it acts through the spring, and its gain is the spring's stiffness.
-    - ``of_base``: whether the base is shaken: the reading is relative to it, and inertial forces act.
-    - ``by_inertia``: whether its gain is the body's inertia, with the sign of ``scale``.
-    - ``by_actuator``: whether it is the demand on an actuator, whose lag and limits then change the moment.
-    - ``takes_gain``: whether a run may state ``drive_gain``; where it does not, the gain is fitted.
-    - ``keys``: which of ``drive_gain`` and ``servo_kv`` a run may state.
-    - ``scale``: N m per unit; for an input that takes a gain, the factor on the gain.
-    - ``amplitudes``: the key of a plan for its peaks; empty: no plan has it.
-    - ``units``: its possible units in a file, with their factors.
+def refuse_untreated(
+    drive: Input,
+    spring_stiffness: float | None,
+    quantity: Literal["angle", "rate", "acceleration"],
+    where: str,
+    *,
+    wind_on: bool = False,
+) -> None:
+    """Refuse an input with which no driven run can be identified or diagnosed.
+
+    Args:
+        spring_stiffness: as stated, N m/rad; None where it is not stated.
+        quantity: measured by the sensor.
+        wind_on: whether the wind blows.
     """
-
-    column: ClassVar[InputColumn]
-    unit: ClassVar[str]
-    meaning: ClassVar[str]
-    noun: ClassVar[str]
-    of_spring: ClassVar[bool] = False
-    of_base: ClassVar[bool] = False
-    by_inertia: ClassVar[bool] = False
-    by_actuator: ClassVar[bool] = False
-    takes_gain: ClassVar[bool] = False
-    keys: ClassVar[tuple[str, ...]] = ()
-    scale: ClassVar[float] = 1.0
-    amplitudes: ClassVar[str] = ""
-    units: ClassVar[Mapping[str, float]] = {}
-
-    def gain(self, stated: float | None, spring_stiffness: float | None) -> float | None:
-        """The moment on the body per unit, N m; None where it is not known.
-
-        Args:
-            stated: ``drive_gain`` of the run, N m per unit; None where it states none.
-            spring_stiffness: Kr, N m/rad; None where the run states none.
-        """
-        del stated, spring_stiffness
-        return self.scale
-
-    def true_scale(self, gain: float, spring_stiffness: float, inertia: float) -> float:
-        """The moment on the body per unit in a simulated run, N m.
-
-        Args:
-            gain: for an input whose gain the run does not state, N m per unit.
-            spring_stiffness: Kr, N m/rad.
-            inertia: Izz, kg m².
-        """
-        del gain, spring_stiffness, inertia
-        return self.scale
-
-    def known_gain(self, *, windy: bool) -> KnownGain | None:
-        """The gain over the inertia where it needs neither an inertia nor a stated gain; None elsewhere.
-
-        Args:
-            windy: whether the wind blows, which adds to the stiffness.
-        """
-        del windy
-        return None
-
-    def holds(self, name: str, unit: str) -> bool:
-        """Whether a column with this name and unit is an input of this kind."""
-        heading = f"{name.strip()}_{unit}" if unit else name.strip()
-        return heading.lower().replace("/", "_") == self.column
-
-    def factor(self, unit: str) -> float:
-        """From a unit of a file to the column's unit; 1 for an unknown unit."""
-        return self.units.get(unit, 1.0)
+    kind = drive.kind
+    remedy = "state the spring's stiffness, or name the input moment_nm or drive"
+    what = ""
+    if spring_stiffness == 0.0 and "servo_kv" in kind.keys:
+        what = "the command acts through the servo, whose kp is spring_stiffness, which is 0"
+        remedy = "state the kp of the servo as spring_stiffness, or leave spring_stiffness out"
+    elif spring_stiffness == 0.0 and not drive.on_body:
+        what = "the motion of the root acts through the spring, but spring_stiffness is 0"
+    elif spring_stiffness == 0.0 and kind.by_inertia:
+        what = "without a spring, a turning base does not determine a moment in N m"
+        remedy = "leave the run out, or drive the body by a moment"
+    elif kind.of_base and wind_on:
+        what = "a shaken base is not supported with the wind on"
+        remedy = "shake the base with the wind off, or leave the run out"
+    elif quantity == "acceleration":  # it jumps with a held input
+        what, remedy = "the run is driven, and its sensor reads accelerations", "record the angle or its rate"
+    elif quantity == "rate" and spring_stiffness == 0.0:
+        what = "in a driven run without a spring, the zero of a rate sensor looks like a constant moment"
+        remedy = "record the angle"
+    if what:
+        raise TunnelError(what, where=where, remedy=remedy)
 
 
-class Moment(Input):
-    """A known moment on the body."""
-
-    column = "moment_nm"
-    unit = "N m"
-    meaning = "a known moment in N m"
-    noun = "moment"
-    by_actuator = True
-    amplitudes = "amplitudes_nm"
-
-    def holds(self, name: str, unit: str) -> bool:
-        """By the column's name, or a unit of moment."""
-        return super().holds(name, unit) or unit.strip().lower() in _MOMENTS
+def refuse_several_gains(drives: Iterable[Input], where: str) -> None:
+    """Refuse inputs of several columns whose gains are unknown: one gain is fitted, common to the runs."""
+    columns = sorted({one.column for one in drives if one.kind.takes_gain and one.gain is None})
+    if len(columns) > 1:
+        raise TunnelError(
+            f"the gains of {' and '.join(columns)} are unknown, but the fit has one common gain",
+            where=where,
+            remedy="state drive_gain of one of them, or take the runs of each input separately",
+        )
 
 
-class _OfGain(Input):
-    """An input whose gain a run may state."""
+def without_spring_needs_input(spring_stiffness: float | None, drive: Input | None, where: str) -> None:
+    """Refuse a run with neither a spring nor an input.
 
-    takes_gain = True
-    keys = ("drive_gain",)
-
-    def gain(self, stated: float | None, spring_stiffness: float | None) -> float | None:
-        """The gain stated by the run."""
-        del spring_stiffness
-        return None if stated is None else self.scale * stated
-
-    def true_scale(self, gain: float, spring_stiffness: float, inertia: float) -> float:
-        """The gain that the run does not state."""
-        del spring_stiffness, inertia
-        return self.scale * gain
-
-
-class Unscaled(_OfGain):
-    """An input in any unit; moment = gain · input."""
-
-    column = "drive"
-    unit = "units"
-    meaning = "an input of unknown gain"
-    noun = "input"
-    by_actuator = True
-
-
-class _OfSpring(Input):
-    """An angle of the spring's other end; moment = Kr · input, in addition to −Kr β."""
-
-    unit = "rad"
-    of_spring = True
-    units = _ANGLES
-
-    def gain(self, stated: float | None, spring_stiffness: float | None) -> float | None:
-        """The spring's stiffness."""
-        del stated
-        return spring_stiffness
-
-    def true_scale(self, gain: float, spring_stiffness: float, inertia: float) -> float:
-        """The spring's stiffness."""
-        del gain, inertia
-        return spring_stiffness
-
-    def known_gain(self, *, windy: bool) -> KnownGain | None:
-        """The stiffness of the motion, which is the spring's where the air adds none."""
-        return None if windy else KnownGain(per_stiffness=1.0)
-
-
-class Root(_OfSpring):
-    """The angle of the spring's root, which moves while the sensor is fixed."""
-
-    column = "base_rad"
-    meaning = "the angle of the spring's root"
-    noun = "root"
-    amplitudes = "amplitudes_rad"
-
-    def holds(self, name: str, unit: str) -> bool:
-        """An angle of a base or a root."""
-        return unit in _ANGLES and (super().holds(name, unit) or _BASE.search(name) is not None)
-
-
-class Command(_OfSpring):
-    """The angle command of a position servo: a spring from there to the body, and a damper."""
-
-    column = "command_rad"
-    meaning = "the command of a position servo"
-    noun = "command"
-    keys = ("servo_kv",)
-
-    def holds(self, name: str, unit: str) -> bool:
-        """An angle that a name calls a goal, a target, a reference or the like; also in the unit of the reading."""
-        if super().holds(name, unit):
-            return True
-        words = _JOINED.sub("_", name)
-        angle = unit in ("", "counts", *_ANGLES) and _NOT_ANGLE.search(words) is None
-        return angle and _COMMAND.search(words) is not None
-
-
-class BaseRotation(Input):
-    """The angular acceleration α of a base that turns about the yaw axis; moment = −Izz α.
-
-    The reading is the angle between body and base, and spring and damper act between them.
+    Args:
+        spring_stiffness: as stated, N m/rad; None where it is not stated.
     """
-
-    column = "base_acceleration_rad_s2"
-    unit = "rad/s2"
-    meaning = "the angular acceleration of the base"
-    noun = "base"
-    of_base = True
-    by_inertia = True
-    scale = -1.0
-    amplitudes = "amplitudes_rad_s2"
-    units = _TURNING
-
-    def gain(self, stated: float | None, spring_stiffness: float | None) -> float | None:
-        """None: the gain is the unknown inertia."""
-        del stated, spring_stiffness
-        return None
-
-    def true_scale(self, gain: float, spring_stiffness: float, inertia: float) -> float:
-        """The inertia, with its sign."""
-        del gain, spring_stiffness
-        return self.scale * inertia
-
-    def known_gain(self, *, windy: bool) -> KnownGain | None:
-        """The gain over the inertia, −1."""
-        del windy
-        return KnownGain(constant=self.scale)
-
-    def holds(self, name: str, unit: str) -> bool:
-        """An angular acceleration of a base."""
-        return super().holds(name, unit) or (unit in _TURNING and _SHAKEN.search(name) is not None)
-
-
-class BaseTranslation(_OfGain):
-    """The acceleration a of a base that moves across the body's arm; moment = −gain · a, with gain = mass · arm.
-
-    The arm, from the axis to the centre of mass, is assumed to be the one at rest.
-    """
-
-    column = "base_acceleration_m_s2"
-    unit = "m/s2"
-    meaning = "the acceleration of the base, of unknown mass times arm"
-    of_base = True
-    noun = "base"
-    scale = -1.0
-    amplitudes = "amplitudes_m_s2"
-
-    def holds(self, name: str, unit: str) -> bool:
-        """An acceleration of a base, with or without a unit, since the gain is fitted."""
-        if super().holds(name, unit):
-            return True
-        accelerates = _plain(unit) in _ALONG or (not unit and _ACCELERATION.search(name) is not None)
-        return accelerates and _SHAKEN.search(name) is not None
-
-    def factor(self, unit: str) -> float:
-        """From a unit of length over time squared, or from g."""
-        return _ALONG.get(_plain(unit), 1.0)
-
-
-def without_command(name: str) -> str:
-    """The name of a command without the word that calls it one, in lower case: ``q`` of ``q_ref``."""
-    words = _JOINED.sub("_", name)
-    joined = re.sub(
-        r"(?i)^(goal|target|desired|ref|cmd)(?=pos|angle|yaw|theta|q)|(?<=^q)(des|ref|cmd)$", "", words
-    )
-    rest = joined if joined != words else _COMMAND.sub("", words)
-    return re.sub(r"^[\s_]+|[\s_]+$", "", rest).lower()
-
-
-def _plain(unit: str) -> str:
-    """A unit unknown to imports, in the spelling of `_ALONG`."""
-    return unit.lower().translate(_PLAIN)
-
-
-KINDS: tuple[Input, ...] = (Moment(), Unscaled(), Root(), Command(), BaseRotation(), BaseTranslation())
-"""In the order in which they are asked whether a column is theirs; what none claims is an input of any unit."""
-
-INPUTS: Mapping[InputColumn, Input] = {kind.column: kind for kind in KINDS}
-"""The kinds of input by their columns."""
-
-INPUT_COLUMNS: tuple[InputColumn, ...] = tuple(INPUTS)
-"""The columns of a run file that may hold its input."""
-
-WITHOUT_UNIT: Mapping[str, tuple[InputColumn, ...]] = {
-    "base_acceleration": (BaseRotation.column, BaseTranslation.column)
-}
-"""Names that lack the unit which says what kind of input a column is, with the columns that they may be."""
+    if spring_stiffness == 0.0 and drive is None:
+        raise TunnelError(
+            "'spring_stiffness' = 0 is not greater than 0, and only a driven run may have no spring",
+            where=where,
+            remedy="give spring_stiffness as a positive number in N m/rad, or the run file an input column "
+            f"{one_of(INPUT_COLUMNS)}",
+        )

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tunnel_sim.vocabulary.between_runs import Repeatability, Scatter
-from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.quantities import Hertz, PerSample, Times
 from tunnel_sim.vocabulary.record import Array
 
@@ -129,7 +129,7 @@ class Condition:
     air_density: float
     release_angle: float
     duration: float
-    drive: Drive | None = None
+    drive: Input | None = None
     gain: float = 1.0
 
 

@@ -14,11 +14,11 @@ from tests.support.gap_campaigns import nominal
 from tunnel_sim.effects import EffectChain, effect_class, effect_from
 from tunnel_sim.effects.chain import read_motion
 from tunnel_sim.files.rig_file import load_rig
-from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.forward import forward_motion
+from tunnel_sim.physics.input_moment import InputMoment
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive, Hold
+from tunnel_sim.vocabulary.inputs import Hold, Input
 from tunnel_sim.vocabulary.plan import AeroDerivatives, SensorModel
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -58,7 +58,7 @@ def campaign(*, kept: bool, hold: Hold = "linear", known: bool = True) -> Campai
         values, angle = record(number, hold, kept=kept, known=known)
         reading = angle + NOISE * np.random.default_rng([number, 1]).standard_normal(COUNT)
         time = np.arange(COUNT) / RATE
-        drive = Drive("moment_nm", values, hold)
+        drive = Input("moment_nm", values, hold)
         runs.append(Run(f"r{number}", Record(time, reading), 0.0, spring_stiffness=spring, drive=drive))
     return Campaign("driven", RigProperties(), SensorProperties(sample_rate=RATE), tuple(runs))
 
@@ -74,7 +74,7 @@ def test_the_effect_leaves_out_what_a_logger_leaves_out(hold: Hold, kept: bool) 
         INERTIA,
         DAMPING,
         duration=COUNT / RATE,
-        drive=DriveMoment(stamps, values, held=hold == "zero"),
+        drive=InputMoment(stamps, values, held=hold == "zero"),
     )
     effect = effect_from("dropped_samples", {"lost_time": LOST, "input_kept": float(kept)})
     # at the first sample that is late half of an interval of the transition has passed

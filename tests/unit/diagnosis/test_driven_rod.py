@@ -9,8 +9,8 @@ from scipy.linalg import expm
 from diagnosis import diagnose
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive
-from tunnel_sim.vocabulary.inputs import InputColumn
+from tunnel_sim.vocabulary.input_kinds import InputColumn
+from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.record import Array, Record
 
 RATE, INERTIA, DAMPING, NOISE = 200.0, 0.1, 0.02, 3e-4
@@ -50,7 +50,7 @@ def test_a_flexible_rod_is_named(column: InputColumn) -> None:
         waves = np.cos(2.0 * np.pi * np.outer(TIME, lines) + rng.uniform(0.0, 2.0 * np.pi, lines.size))
         values = waves.sum(axis=1) * (0.2 if column == "moment_nm" else 0.01)
         seen = reading(column, values, spring) + NOISE * rng.standard_normal(TIME.size)
-        drive = Drive(column, values)
+        drive = Input(column, values)
         runs.append(Run(f"r{seed}", Record(TIME, seen), 0.0, spring_stiffness=spring, drive=drive))
     campaign = Campaign("driven", RigProperties(), SensorProperties(sample_rate=RATE), tuple(runs))
     names = "rod_flexibility", "second_mode", "cubic_stiffness", "input_delay", "dropped_samples"

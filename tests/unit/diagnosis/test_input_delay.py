@@ -18,8 +18,8 @@ from tunnel_sim.effects.sensor import InputDelay
 from tunnel_sim.engine.virtual_campaign import plan_effects
 from tunnel_sim.files.plan_file import paper_plan
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.plan import EffectSetting
 from tunnel_sim.vocabulary.record import Record
 
@@ -53,7 +53,7 @@ def campaign(delay: float = 0.0, lag: float = 0.0, cubic: float = 0.0) -> Campai
         reading = path.y[2 if lag else 0] + NOISE * rng.standard_normal(TIME.size)
         values = np.array([moment(t) for t in TIME])
         return Run(
-            f"r{seed}", Record(TIME, reading), 0.0, spring_stiffness=SPRING, drive=Drive("moment_nm", values)
+            f"r{seed}", Record(TIME, reading), 0.0, spring_stiffness=SPRING, drive=Input("moment_nm", values)
         )
 
     return Campaign("driven", RigProperties(), SensorProperties(sample_rate=RATE), (run(0), run(1)))

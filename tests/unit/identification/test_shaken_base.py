@@ -19,9 +19,9 @@ from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
 from tunnel_sim.files.importing.records import read_records
 from tunnel_sim.files.plan_file import load_plan
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.inputs import InputColumn
+from tunnel_sim.vocabulary.input_kinds import InputColumn
+from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.plan import CampaignPlan, EffectSetting
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -81,7 +81,7 @@ def shaken(column: InputColumn, seed: int, spring: float, *, noise: float = NOIS
     base = Base(seed, spring, 0.6 if column == TURNS else 0.3)
     motion = (turned if column == TURNS else pushed)(base, spring)
     reading = motion + noise * np.random.default_rng(seed).standard_normal(TIME.size)
-    drive = Drive(column, base.moved(TIME, 2), "linear")
+    drive = Input(column, base.moved(TIME, 2), "linear")
     return Run(f"r{seed}", Record(TIME, reading), 0.0, spring, drive=drive)
 
 
@@ -251,6 +251,6 @@ def test_a_base_that_hardly_moves_the_body_is_not_taken_for_one_of_the_other_sig
     rng = np.random.default_rng(seed)
     decay = np.exp(-DAMPING / (2.0 * INERTIA) * TIME) * np.cos(np.sqrt(SPRINGS[0] / INERTIA) * TIME)
     reading = 0.2 * decay + NOISE * rng.standard_normal(TIME.size)
-    quiet = Drive(TURNS, 1e-4 * rng.standard_normal(TIME.size))
+    quiet = Input(TURNS, 1e-4 * rng.standard_normal(TIME.size))
     run = Run("r", Record(TIME, reading), 0.0, SPRINGS[0], drive=quiet)
     identify(Campaign("quiet", RigProperties(), SensorProperties(sample_rate=RATE), (run,)))

@@ -23,9 +23,9 @@ from tunnel_sim.files.toml_input import (
     read_document,
     validate,
 )
-from tunnel_sim.vocabulary.drive import Hold
 from tunnel_sim.vocabulary.errors import TunnelError, one_line, one_of
-from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS, InputColumn
+from tunnel_sim.vocabulary.input_kinds import INPUT_COLUMNS, InputColumn
+from tunnel_sim.vocabulary.inputs import Hold
 
 
 class StatedBy(StrictModel):

@@ -42,7 +42,7 @@ from tunnel_sim.files.importing.tables import Channel, Table, is_input
 from tunnel_sim.files.importing.units import claims, kind_of
 from tunnel_sim.vocabulary.campaign import Quantity
 from tunnel_sim.vocabulary.errors import TunnelError, attempt, did_you_mean, joined, one_line
-from tunnel_sim.vocabulary.inputs import without_command
+from tunnel_sim.vocabulary.input_kinds import without_command
 from tunnel_sim.vocabulary.quantities import Readings, Rows
 
 _HEAD = 20_000  # samples of a column without a name that are inspected

@@ -18,9 +18,9 @@ from tunnel_sim.files.plausible import KEEP, checked_record, few_samples
 from tunnel_sim.files.reading import stem_of
 from tunnel_sim.files.toml_input import one_line, shown
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
-from tunnel_sim.vocabulary.drive import HOLDS, Drive, Hold, without_spring_needs_drive
 from tunnel_sim.vocabulary.errors import TunnelError, counted
-from tunnel_sim.vocabulary.inputs import INPUTS
+from tunnel_sim.vocabulary.input_kinds import INPUTS
+from tunnel_sim.vocabulary.inputs import HOLDS, Hold, Input, without_spring_needs_input
 from tunnel_sim.vocabulary.quantities import Readings, Times
 from tunnel_sim.vocabulary.record import Record
 
@@ -101,7 +101,7 @@ def imported_run(
         held = {key: stated.pop(key) for key in ("spring_stiffness",) if key in stated}
         remarks.append(doubt(f"air_density is not stated (wind-on, {stated['wind_speed']:g} m/s)"))
     drive = _drive(raw, kept, choices, remarks)
-    without_spring_needs_drive((stated | held).get("spring_stiffness"), drive, where)
+    without_spring_needs_input((stated | held).get("spring_stiffness"), drive, where)
     time = from_zero(time)
     try:
         record, stride = None, time.size // _JUDGED
@@ -162,7 +162,7 @@ def _left_out(error: TunnelError) -> str:
     return f"left out: {error.what}{kept}"
 
 
-def _drive(raw: RawRecord, kept: slice, choices: ImportChoices, said: list[str]) -> Drive | None:
+def _drive(raw: RawRecord, kept: slice, choices: ImportChoices, said: list[str]) -> Input | None:
     """The input of a run; None for a free decay."""
     if raw.input is None:
         return None
@@ -177,4 +177,4 @@ def _drive(raw: RawRecord, kept: slice, choices: ImportChoices, said: list[str])
         said.append(found if order in (0.0, 1.0) else doubt(f"drive_hold: {asked}"))
     said += [] if gain is None else [f"drive_gain = {gain:g} from the file"]
     said += [] if kv is None else [f"servo_kv = {kv:g} from the file"]
-    return Drive(column, values[kept], hold, gain, kv)
+    return Input(column, values[kept], hold, gain, kv)

@@ -14,9 +14,9 @@ from tunnel_sim.files.importing.column_names import ANGLE, named
 from tunnel_sim.files.importing.condition_names import condition_of
 from tunnel_sim.files.importing.remarks import doubt
 from tunnel_sim.files.importing.tables import Channel, is_input
-from tunnel_sim.vocabulary.drive import Drive, checked_drive
 from tunnel_sim.vocabulary.errors import TunnelError, counted, did_you_mean, one_line
-from tunnel_sim.vocabulary.inputs import INPUTS, KINDS, Command, InputColumn
+from tunnel_sim.vocabulary.input_kinds import INPUTS, KINDS, Command, InputColumn
+from tunnel_sim.vocabulary.inputs import Input, checked_input
 from tunnel_sim.vocabulary.quantities import PerSample, Rows, Share
 from tunnel_sim.vocabulary.record import Record
 
@@ -108,7 +108,7 @@ def find_input(
             continue
         record = Record(np.arange(np.count_nonzero(good), dtype=np.float64), reading[good])
         with suppress(TunnelError):  # it is not the motion itself
-            checked_drive(Drive("drive", channel.values[good]), record, "", judged=False)
+            checked_input(Input("drive", channel.values[good]), record, "", judged=False)
             # The command of an angle by its name moves the body, however little of the motion it explains.
             certain = names_command(channel) and ANGLE.search(channel.name)
             if certain or chance_without_effect(channel.values[good], reading[good]) < _FALSE_ALARM:

@@ -32,7 +32,7 @@ from tunnel_sim.files.importing.units import UNITS, kind_of, names_a_time
 from tunnel_sim.files.reading import stem_of
 from tunnel_sim.vocabulary.campaign import Quantity
 from tunnel_sim.vocabulary.errors import TunnelError, attempt, counted, joined, one_line, shown
-from tunnel_sim.vocabulary.inputs import InputColumn
+from tunnel_sim.vocabulary.input_kinds import InputColumn
 from tunnel_sim.vocabulary.quantities import PerSample, Rows, Seconds
 from tunnel_sim.vocabulary.turning_points import HoldsTurningPoints, TurningPoints, are_turning_points
 

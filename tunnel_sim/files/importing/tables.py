@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tunnel_sim.vocabulary import limits
-from tunnel_sim.vocabulary.drive import DRIVE_KEYS, HOLDS
-from tunnel_sim.vocabulary.inputs import INPUT_COLUMNS
+from tunnel_sim.vocabulary.input_kinds import INPUT_COLUMNS
+from tunnel_sim.vocabulary.inputs import HOLDS, INPUT_KEYS
 from tunnel_sim.vocabulary.quantities import Rows
 from tunnel_sim.vocabulary.text_cells import from_text_cell
 
 if TYPE_CHECKING:
     import polars as pl
 
-INPUT_FACTS = DRIVE_KEYS
+INPUT_FACTS = INPUT_KEYS
 """What a file may state of the input of a run, as an export writes it."""
 
 _RUN_NAMES = re.compile(
@@ -111,7 +111,7 @@ def heading(channel: Channel) -> str:
 
 
 def with_input_facts(table: Table) -> Table:
-    """A table whose columns `DRIVE_KEYS`, as an export writes them, are single numbers."""
+    """A table whose columns `INPUT_KEYS`, as an export writes them, are single numbers."""
     stated = [channel for channel in table.channels if channel.name in INPUT_FACTS]
     facts = {c.name: float(good[0]) for c in stated if (good := c.values[np.isfinite(c.values)]).size}
     channels = tuple(channel for channel in table.channels if channel not in stated)

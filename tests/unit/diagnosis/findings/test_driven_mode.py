@@ -12,11 +12,11 @@ from scipy.signal import lfilter
 
 from diagnosis.search.investigate import nominal_study
 from tunnel_sim.effects import EffectChain, effect_class, effect_from
-from tunnel_sim.physics.drive import DriveMoment
+from tunnel_sim.physics.input_moment import InputMoment
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.plan import AeroDerivatives
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -36,7 +36,7 @@ def free(time: Array, start: float, rate: float) -> Array:
 
 
 def test_the_answer_to_a_step_is_that_of_the_closed_form() -> None:
-    drive = DriveMoment(
+    drive = InputMoment(
         np.array([0.0, 0.13, 0.5]), np.array([0.0, 2.0, 0.0]), scale=3.0, delay=0.01, held=True
     )
     time = np.linspace(0.0, 1.0, 401)
@@ -47,7 +47,7 @@ def test_the_answer_to_a_step_is_that_of_the_closed_form() -> None:
 
 
 def test_the_answer_to_a_ramp_and_its_derivatives_are_those_of_the_closed_form() -> None:
-    drive = DriveMoment(np.array([0.0, 0.13, 0.63]), np.array([0.0, 0.0, 5.0]))
+    drive = InputMoment(np.array([0.0, 0.13, 0.63]), np.array([0.0, 0.0, 5.0]))
     time = np.linspace(0.0, 0.6, 301)
     on, lag = time - 0.13, 2.0 * ZETA / OMEGA
     ramp = np.where(on > 0.0, 10.0 * (on - lag), 0.0)
@@ -61,9 +61,9 @@ def test_the_answer_to_a_ramp_and_its_derivatives_are_those_of_the_closed_form()
 
 
 def test_samples_in_between_change_nothing_and_what_was_before_the_start_does_not_count() -> None:
-    coarse = DriveMoment(np.arange(20) / 20.0, np.random.default_rng(1).standard_normal(20))
+    coarse = InputMoment(np.arange(20) / 20.0, np.random.default_rng(1).standard_normal(20))
     times = np.sort(np.r_[coarse.time_s, np.random.default_rng(2).uniform(0.0, 0.95, 300)])
-    fine = DriveMoment(times, np.interp(times, coarse.time_s, coarse.values))
+    fine = InputMoment(times, np.interp(times, coarse.time_s, coarse.values))
     at = np.linspace(0.0, 1.2, 100)
     here = coarse.oscillation(OMEGA, ZETA, at)
     assert np.max(np.abs(here - fine.oscillation(OMEGA, ZETA, at))) < 1e-12
@@ -78,7 +78,7 @@ def test_a_late_input_excites_the_mode_later_and_one_that_ends_leaves_what_a_rel
     )
     late = effect_from("input_delay", {"delay": 0.05})
     spring = 16.0
-    held = DriveMoment(np.array([0.0, 8.0]), np.array([0.35 * spring, 0.0]), held=True)
+    held = InputMoment(np.array([0.0, 8.0]), np.array([0.35 * spring, 0.0]), held=True)
     run = RunSettings(spring, AeroDerivatives(0.0, 0.0), INERTIA, DAMPING, duration=9.0, drive=held)
     chain = EffectChain(run, (mode, late), (0.3, None))
     time = np.array([8.04, 8.0501, 8.1, 8.2])
@@ -131,7 +131,7 @@ def test_a_slow_mode_that_the_input_excites_does_not_count_as_colour_of_the_nois
                 Record(TIME, seen),
                 0.0,
                 spring_stiffness=spring,
-                drive=Drive("moment_nm", values),
+                drive=Input("moment_nm", values),
             )
         )
     campaign = Campaign("driven", RigProperties(), SensorProperties(sample_rate=RATE), tuple(runs))

@@ -21,7 +21,7 @@ from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.writing import import_records
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive, Hold
+from tunnel_sim.vocabulary.inputs import Hold, Input
 from tunnel_sim.vocabulary.record import Record
 
 pytestmark = pytest.mark.usefixtures("causes_alone")
@@ -43,7 +43,7 @@ def held(hold: Hold | None) -> Campaign:
         command = 0.1 * np.cos(np.outer(time, omega) + rng.uniform(0.0, 2.0 * np.pi, omega.size)).sum(axis=1)
         _, reading, _ = dlsim(system, command, x0=[0.02, 0.0])
         yaw = reading[:, 0] + NOISE * rng.standard_normal(time.size)
-        drive = Drive("moment_nm", command, hold)
+        drive = Input("moment_nm", command, hold)
         return Run(f"r{seed}", Record(time, yaw), 0.0, spring_stiffness=SPRING, drive=drive)
 
     return Campaign("held", RigProperties(), SensorProperties(sample_rate=RATE), (run(0), run(1)))

@@ -10,7 +10,8 @@ from diagnosis.likelihood.sensitivities import motion_changes, moves
 from diagnosis.model.parameters import Point
 from tests.unit.diagnosis.likelihood.test_least_squares import SIX, prepared
 from tunnel_sim.effects import ALL_EFFECTS, effect_class
-from tunnel_sim.physics.drive import DriveMoment
+from tunnel_sim.physics.input_moment import InputMoment
+from tunnel_sim.vocabulary.input_kinds import INPUTS
 
 NOMINAL = {"yaw_inertia": 0.1014, "mechanical_damping": 0.012, "cn_beta": 0.49, "cn_r": -0.11, "zero": 0.004}
 #: Parameters that take finite differences: a law, or samples of the wind, that exist on one side only.
@@ -118,7 +119,8 @@ def driven(data, *, on_body, even):
         size, interval = run.reading.size * run.block, run.interval / run.block
         times = (np.arange(size) + (0.0 if even else rng.uniform(-0.4, 0.4, size))) * interval
         values = (0.5 if on_body else 0.1) * np.sin((3.0 + number) * times + times**2)
-        runs.append(dataclasses.replace(run, drive=DriveMoment(times, values, on_body=on_body)))
+        kind = INPUTS["moment_nm" if on_body else "base_rad"]
+        runs.append(dataclasses.replace(run, drive=InputMoment(times, values, kind=kind)))
     return data.with_runs(tuple(runs))
 
 

@@ -18,7 +18,7 @@ from diagnosis.model.similarity import REFERENCE_INERTIA
 from diagnosis.result import Diagnosis
 from diagnosis.search.views.by_moment import by_moment
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.record import Record
 
 pytestmark = pytest.mark.usefixtures("causes_alone")
@@ -71,7 +71,7 @@ def joint(friction: float, seed: int, unknown: float = 0.0, load: float = 0.0) -
             ends = start + k / (STEPS * RATE), start + (k + 1) / (STEPS * RATE)
             state = turned(friction, state[0], state[1], *ends, acting, load)
     reading = np.array(angles) + NOISE * np.random.default_rng([seed, 1]).standard_normal(TIME.size)
-    return Run(f"r{seed}", Record(TIME, reading), 0.0, 0.0, drive=Drive("moment_nm", values))
+    return Run(f"r{seed}", Record(TIME, reading), 0.0, 0.0, drive=Input("moment_nm", values))
 
 
 def campaign(*runs: Run, inertia: float | None = None) -> Campaign:

@@ -29,10 +29,10 @@ from tests.reference.robot_joints import (
     robot_campaign,
 )
 from tests.support.robots import KINDS, RUBS, TRUE, inertia, near, own_model
-from tunnel_sim.physics.drive import DriveMoment
+from tunnel_sim.physics.input_moment import InputMoment
 from tunnel_sim.vocabulary.campaign import Campaign
-from tunnel_sim.vocabulary.drive import Hold
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.inputs import Hold
 
 pytestmark = pytest.mark.usefixtures("models_in_this_process")
 
@@ -159,7 +159,7 @@ def test_inputs_that_are_not_the_joints_are_refused_in_one_line(tmp_path: Path, 
 
 def test_a_step_has_the_mean_of_the_input_over_it() -> None:
     times, values = np.array([0.0, 1.0, 2.0]), np.array([1.0, 3.0, 0.0])
-    held = DriveMoment(times, values, held=True)
+    held = InputMoment(times, values, held=True)
     assert held.means(np.array([0.0, 0.5, 1.5, 3.0])) == pytest.approx([1.0, 2.0, 1.0])
     linear = replace(held, held=False)
     assert linear.means(np.array([0.0, 0.5, 1.5, 3.0])) == pytest.approx([1.5, 2.5 - 0.125, 0.1875 * 4 / 3])

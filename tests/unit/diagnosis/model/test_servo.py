@@ -19,8 +19,8 @@ from tests.support import robots
 from tests.support.robots import RUBS, TRUE, near, own_model
 from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
-from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.inputs import Input
 
 pytestmark = pytest.mark.usefixtures("models_in_this_process")
 
@@ -38,7 +38,7 @@ def commanded(
     runs = []
     for run in data.runs:
         assert run.drive is not None
-        drive = Drive("command_rad", run.drive.values, run.drive.hold, servo_kv=kv)
+        drive = Input("command_rad", run.drive.values, run.drive.hold, servo_kv=kv)
         runs.append(replace(run, drive=drive, spring_stiffness=kp))
     return replace(data, runs=tuple(runs))
 

@@ -30,7 +30,7 @@ from tunnel_sim.engine.joint_patch import (
     simulate_joint,
 )
 from tunnel_sim.physics.actuator import ActuatorLimits
-from tunnel_sim.physics.drive import DriveMoment
+from tunnel_sim.physics.input_moment import InputMoment
 from tunnel_sim.physics.run_settings import Motion
 from tunnel_sim.vocabulary.campaign import Campaign
 
@@ -45,7 +45,7 @@ def swung() -> Campaign:
     return robot_campaign(robot(TRUE))
 
 
-def moved(model: JointModel, patch: Control | None, drive: DriveMoment) -> Motion:
+def moved(model: JointModel, patch: Control | None, drive: InputMoment) -> Motion:
     spec, _ = patched(model, [patch] if patch else [])
     return simulate_joint(spec.compile(), model.law.rest, Start("r1", 0.0, 0.0, 0.0, drive), 4.0, 0)
 
@@ -74,7 +74,7 @@ def test_a_native_actuator_moves_the_joint_as_its_law(
     model = own_model(tmp_path, swung, xml)
     assert model.law.actuator is not None
     gain = model.law.actuator.gain
-    asked = DriveMoment(TIME, multisine(3, 6.0 / gain), gain)
+    asked = InputMoment(TIME, multisine(3, 6.0 / gain), gain)
     patch = Control(0, made.limit / gain, made.lag, delay)
     native, plain = moved(model, patch, asked), moved(model, None, asked)
     law = moved(model, None, replace(asked, actuator=made, delay=delay).acting)
@@ -91,7 +91,7 @@ def test_a_delay_replays_from_a_key_frame_with_the_history_that_its_note_fills(
 ) -> None:
     model = own_model(tmp_path, swung, robot(TRUE, option='timestep="0.001" integrator="Euler"'))
     assert model.law.actuator is not None
-    drive = DriveMoment(TIME, 0.2 + multisine(3, 0.3), model.law.actuator.gain)
+    drive = InputMoment(TIME, 0.2 + multisine(3, 0.3), model.law.actuator.gain)
     start = Start("r1", 0.0, 0.1, 0.5, drive)
     patch = [Control(0, lag=0.02, delay=0.0125)]
     engine = mujoco.MjModel.from_xml_string(patched_xml(patched(model, patch, [start])[0], model, tmp_path))

@@ -13,7 +13,7 @@ from diagnosis import Diagnosis, diagnose, vocabulary
 from tunnel_lab.commands.diagnose import write_proposal
 from tunnel_sim.effects.expression_effect import read_effects
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.record import Array, Record
 
 RATE, STEP, SECONDS = 100.0, 5e-4, 20.0
@@ -51,7 +51,7 @@ def campaign(rise: float, by_angle: float = 0.0, load: float = 0.0) -> Campaign:
         reading = found[::every] + 2e-4 * np.random.default_rng([seed, 1]).standard_normal(
             clock[::every].size
         )
-        drive = Drive("moment_nm", moment[::every])
+        drive = Input("moment_nm", moment[::every])
         runs.append(Run(f"r{seed + 1}", Record(clock[::every], reading), 0.0, STIFFNESS, drive=drive))
     return Campaign("driven", RigProperties(), SensorProperties(RATE), tuple(runs))
 

@@ -25,7 +25,7 @@ from tests.support.gap_campaigns import campaign, nominal
 from tests.support.robots import KINDS, TRUE, near, own_model
 from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.record import Array, Record
 from tunnel_sim.vocabulary.rig import JointLaw, Term
 
@@ -209,7 +209,7 @@ def campaign_of(
     for place, (start, peak) in enumerate([(0.4, 0.3), (0.8, 0.25)]):
         control = multisine(seed + place, peak) if driven else np.zeros(TIME.size)
         noise = np.random.default_rng([seed + place, 1]).normal(0.0, NOISE, TIME.size)
-        drive = Drive("drive", control, "zero", None) if driven else None
+        drive = Input("drive", control, "zero", None) if driven else None
         reading = moves(xml, start, control, back, share) + noise
         runs.append(Run(f"r{place + 1}", Record(TIME, reading), 0.0, drive=drive))
     return Campaign("robot", RigProperties(), SensorProperties(RATE), tuple(runs))

@@ -10,7 +10,7 @@ from diagnosis.diagnosable import kinds_for
 from diagnosis.model.joint import Joint
 from tests.support.rendered import where_words
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.record import Array, Record
 from tunnel_sim.vocabulary.rig import Actuator, JointLaw, Term
 
@@ -40,7 +40,7 @@ def campaign(hum: float = 0.0) -> Campaign:
     for number, amplitude in enumerate((2.0, 1.6, 1.2), 1):
         time, angle, moment = response(amplitude, hum)
         angle = angle + 2e-4 * np.random.default_rng(number).standard_normal(time.size)
-        drive = Drive("moment_nm", moment)
+        drive = Input("moment_nm", moment)
         runs.append(Run(f"r{number}", Record(time, angle), 0.0, STIFFNESS, drive=drive))
     return Campaign("driven", RigProperties(), SensorProperties(RATE), tuple(runs))
 

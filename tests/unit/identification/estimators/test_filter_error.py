@@ -7,8 +7,8 @@ from scipy.linalg import expm
 from identification import identify
 from identification.signal.forcing import driven_rows
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive
-from tunnel_sim.vocabulary.inputs import InputColumn
+from tunnel_sim.vocabulary.input_kinds import InputColumn
+from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.record import Array, Record
 
 RATE, INERTIA, DAMPING, SPRING, NOISE, GAIN = 100.0, 0.1, 0.1, 16.0, 5e-4, 2.5
@@ -39,7 +39,7 @@ def campaign(column: InputColumn, intensity: float, seed: int) -> Campaign:
         factor = {"moment_nm": 1.0, "drive": GAIN, "base_rad": SPRING}[column] / INERTIA
         reading = factor * driven_rows(TIME, values, 0.5 * DAMPING / INERTIA, SPRING / INERTIA, held=False)[0]
         reading = reading + random_motion(intensity, rng) + NOISE * rng.standard_normal(TIME.size)
-        drive = Drive(column, values)
+        drive = Input(column, values)
         runs.append(Run(f"r{place}", Record(TIME, reading), 0.0, SPRING, drive=drive))
     return Campaign("shaken", RigProperties(), SensorProperties(RATE, None, NOISE), tuple(runs))
 

@@ -11,8 +11,8 @@ from identification.estimate import Status
 from identification.signal.forcing import driven_rows, driven_start
 from tests.reference.free_decays import damped_cosine
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive
-from tunnel_sim.vocabulary.inputs import InputColumn
+from tunnel_sim.vocabulary.input_kinds import InputColumn
+from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.record import Record
 
 RATE, INERTIA, DAMPING, NOISE, OFFSET = 200.0, 0.1, 0.15, 5e-4, 0.3
@@ -44,7 +44,7 @@ def loose(seed: int, column: InputColumn = "moment_nm", gain: float | None = Non
     values, factor = moment(seed), 2.5 if column == "drive" else 1.0
     reading = motion(factor * (values + OFFSET))
     reading = reading + NOISE * np.random.default_rng([seed, 1]).standard_normal(TIME.size)
-    drive = Drive(column, values, "zero", gain)
+    drive = Input(column, values, "zero", gain)
     return Run(f"loose-{seed}", Record(TIME, reading), 0.0, 0.0, drive=drive)
 
 

@@ -7,12 +7,13 @@ from identification import identify
 from identification.signal.forcing import driven_rows, driven_start
 from tests.reference.free_decays import damped_cosine
 from tunnel_sim.files.rig_file import load_rig
-from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.forward import forward_motion
+from tunnel_sim.physics.input_moment import InputMoment
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.input_kinds import INPUTS
+from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.plan import AeroDerivatives
 from tunnel_sim.vocabulary.record import Record
 
@@ -76,7 +77,7 @@ def excitation(seed: int) -> np.ndarray:
     return np.convolve(np.random.default_rng(seed).standard_normal(TIME.size), np.ones(6) / 6.0, "same")
 
 
-def integrated(steps: int, drive: DriveMoment) -> np.ndarray:
+def integrated(steps: int, drive: InputMoment) -> np.ndarray:
     run = RunSettings(
         16.0,
         AeroDerivatives(0.0, 0.0),
@@ -91,7 +92,7 @@ def integrated(steps: int, drive: DriveMoment) -> np.ndarray:
 
 @pytest.mark.parametrize("held", [False, True])
 def test_the_integrator_is_of_fourth_order_for_an_input_with_kinks(held: bool) -> None:
-    drive = DriveMoment(TIME, excitation(1), held=held)
+    drive = InputMoment(TIME, excitation(1), held=held)
     exact = driven_rows(TIME, drive.values, A, K, held=held)[0] / INERTIA
     coarse, fine = (np.max(np.abs(integrated(steps, drive) - exact)) for steps in (4, 8))
     assert fine < 1e-8
@@ -103,7 +104,7 @@ def test_a_delay_that_is_not_a_whole_number_of_steps_loses_no_order(held: bool) 
     values, delay = excitation(2), 0.0037
     values[:3] = 0.0
     fine = np.arange(10 * TIME.size) / (10.0 * RATE)
-    drive = DriveMoment(TIME, values, delay=delay, held=held)
+    drive = InputMoment(TIME, values, delay=delay, held=held)
     later = TIME + delay
     finest = np.sort(np.r_[fine, later[later < fine[-1]]])
     at = np.searchsorted(later, finest + 1e-12) - 1
@@ -116,8 +117,8 @@ def test_a_delay_that_is_not_a_whole_number_of_steps_loses_no_order(held: bool) 
 
 
 def test_a_moment_by_the_root_and_on_the_body_are_one_with_a_rigid_rod() -> None:
-    drive = DriveMoment(TIME, excitation(1))
-    by_root = DriveMoment(TIME, excitation(1), on_body=False)
+    drive = InputMoment(TIME, excitation(1))
+    by_root = InputMoment(TIME, excitation(1), kind=INPUTS["base_rad"])
     assert np.max(np.abs(integrated(4, drive) - integrated(4, by_root))) < 1e-13
 
 
@@ -137,7 +138,7 @@ def test_a_resonance_above_half_the_sample_rate_is_no_estimate(seed: int) -> Non
     rng, time = np.random.default_rng(seed), np.arange(3000) / 100.0
     given = np.sin(2.0 * np.pi * 1.5 * time) + 0.3 * rng.normal(size=time.size)
     reading = 10.0 * driven_rows(time, given, 0.25, 100.0, held=True)[0] + 1e-4 * rng.normal(size=time.size)
-    wrong = Run("r", Record(time, reading), 0.0, 10.0, drive=Drive("base_rad", given))
+    wrong = Run("r", Record(time, reading), 0.0, 10.0, drive=Input("base_rad", given))
     with pytest.raises(TunnelError, match="no run could be identified"):
         identify(Campaign("wrong", RigProperties(), SensorProperties(), (wrong,)))
 

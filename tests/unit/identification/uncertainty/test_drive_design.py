@@ -24,8 +24,8 @@ from tests.marks import slow
 from tests.reference.free_decays import campaign
 from tunnel_sim.effects import effect_class
 from tunnel_sim.engine.virtual_campaign import simulate_campaign
-from tunnel_sim.files.plan_drive import DriveTable
 from tunnel_sim.files.plan_file import EffectTable, PlanDocument, plan_from, read_plan
+from tunnel_sim.files.plan_input import InputTable
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import CampaignPlan, Truth
@@ -88,8 +88,8 @@ def test_no_plain_drive_and_no_free_decay_has_a_lower_bound(
     limits = Limits(5.0, np.deg2rad(15.0))
     best = size(propose_drive(given, RIG, limits, goal=goal), goal)
     for plain in (
-        DriveTable(kind="multisine", from_hz=0.5, to_hz=5.0),
-        DriveTable(kind="sine", frequency_hz=float(np.sqrt(RIG.spring(5) / 0.1014) / (2.0 * np.pi))),
+        InputTable(kind="multisine", from_hz=0.5, to_hz=5.0),
+        InputTable(kind="sine", frequency_hz=float(np.sqrt(RIG.spring(5) / 0.1014) / (2.0 * np.pi))),
     ):
         rival = within_limits(given, plain, RIG, limits, given.duration)
         assert best <= size(rival, goal) * 1.01  # inputs are compared with fewer samples

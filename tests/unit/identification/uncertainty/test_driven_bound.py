@@ -7,8 +7,8 @@ from identification import identify
 from identification.signal.forcing import driven_rows
 from tests.reference.free_decays import damped_cosine
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive
-from tunnel_sim.vocabulary.inputs import InputColumn
+from tunnel_sim.vocabulary.input_kinds import InputColumn
+from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.record import Array, Record
 
 TIME = np.arange(1000) / 100.0
@@ -32,7 +32,7 @@ def test_driven_runs_carry_the_scatter_of_their_springs(estimator: str) -> None:
     for place, spring in enumerate((16.0, 36.0) * 4):
         own = motion(spring * (1.0 + 0.004 * rng.standard_normal()), column)
         record = Record(TIME, own + NOISE * rng.standard_normal(TIME.size))
-        drive = None if column is None else Drive(column, VALUES, "zero")
+        drive = None if column is None else Input(column, VALUES, "zero")
         release = 0.2 if column is None else None
         runs.append(Run(f"r{place}", record, 0.0, spring, release_angle=release, drive=drive))
     estimate = identify(Campaign("scattering", RigProperties(), sensor, tuple(runs)), estimator)

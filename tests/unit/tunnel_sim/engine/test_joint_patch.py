@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from diagnosis.patch.elements import Control, DryFriction, Spring
 from tunnel_sim.engine.joint_model import Recorded, read_joint_model
 from tunnel_sim.engine.joint_patch import Start, creep_rate, patched, patched_xml, simulate_joint
-from tunnel_sim.physics.drive import DriveMoment
+from tunnel_sim.physics.input_moment import InputMoment
 from tunnel_sim.vocabulary.record import Array
 
 HUNG = """<mujoco><worldbody><body><joint name="elbow" axis="0 1 0" frictionloss="{}"/>
@@ -52,7 +52,7 @@ def test_presliding_friction_is_native(tmp_path: Path, kind: str, integrator: st
     path.write_text(SWUNG.format(integrator, kind).replace("<worldbody>", gravity + "<worldbody>"))
     model = read_joint_model(path, "elbow", Recorded(0.5))
     patch = [DryFriction(MOMENT, RANGE), Control(0, lag=0.01)]
-    drive = DriveMoment(np.array([0.0, END]), np.zeros(2))
+    drive = InputMoment(np.array([0.0, END]), np.zeros(2))
     spec, written = patched(model, patch, [Start("r1", 0.0, 0.5, 0.0, drive)])
     assert {one.name: one.after for one in written} == {
         "actuator motor time constant": (0.01,),

@@ -12,7 +12,7 @@ from tests.support.env_episodes import make
 from tunnel_sim.effects import effect_class
 from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.inputs import Input
 
 TRUTH = {"cn_beta": 0.47, "cn_r": -0.1, "yaw_inertia": 0.1, "mechanical_damping": 0.02, "sensor_zero": 0.004}
 RATE, PERIOD = 200.0, 0.05
@@ -38,7 +38,7 @@ def campaign(effects: dict[str, dict[str, float]], folder: Path) -> Campaign:
             *_, terminated, truncated, info = env.step(action)
             over = terminated or truncated
         values = np.repeat(info["operator_log"].moment, round(RATE * PERIOD))
-        drive = Drive("moment_nm", values[: info["record"].time_s.size], "zero")
+        drive = Input("moment_nm", values[: info["record"].time_s.size], "zero")
         runs.append(Run(f"r{seed}", info["record"], 0.0, stated["spring_stiffness"], drive=drive))
     write_campaign(Campaign("episodes", RigProperties(), SensorProperties(RATE), tuple(runs)), folder)
     return read_campaign(folder)

@@ -14,8 +14,8 @@ from tunnel_sim.files.importing.inputs import chance_without_effect, correlation
 from tunnel_sim.files.importing.records import read_records
 from tunnel_sim.files.importing.writing import import_records
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.record import Record
 
 TIME = np.arange(1000) * 0.01
@@ -24,9 +24,9 @@ RESPONSE = 0.1 * np.sin(9.0 * TIME - 0.7) + 0.01 * np.cos(31.0 * TIME - 2.0)
 FREE = 0.3 * np.exp(-0.1 * TIME) * np.cos(12.0 * TIME)
 
 
-def campaign(drive: Drive | None = None, spring: float | None = 16.0) -> Campaign:
+def campaign(drive: Input | None = None, spring: float | None = 16.0) -> Campaign:
     driven = Run(
-        "driven", Record(TIME, RESPONSE), 0.0, spring, drive=drive or Drive("moment_nm", INPUT, "linear")
+        "driven", Record(TIME, RESPONSE), 0.0, spring, drive=drive or Input("moment_nm", INPUT, "linear")
     )
     free = Run("free", Record(TIME, FREE), 0.0, 16.0, release_angle=0.3)
     return Campaign("mixed", RigProperties(), SensorProperties(100.0), (driven, free))
@@ -36,14 +36,14 @@ def campaign(drive: Drive | None = None, spring: float | None = 16.0) -> Campaig
 @pytest.mark.parametrize(
     "drive",
     [
-        Drive("moment_nm", INPUT, "zero"),
-        Drive("drive", INPUT, "linear", -2.5),
-        Drive("drive", INPUT),
-        Drive("base_rad", 0.1 * INPUT, "linear"),
-        Drive("command_rad", 0.1 * INPUT, "zero", servo_kv=0.7),
+        Input("moment_nm", INPUT, "zero"),
+        Input("drive", INPUT, "linear", -2.5),
+        Input("drive", INPUT),
+        Input("base_rad", 0.1 * INPUT, "linear"),
+        Input("command_rad", 0.1 * INPUT, "zero", servo_kv=0.7),
     ],
 )
-def test_a_mixed_campaign_is_read_as_it_was_written(tmp_path: Path, run_format: str, drive: Drive) -> None:
+def test_a_mixed_campaign_is_read_as_it_was_written(tmp_path: Path, run_format: str, drive: Input) -> None:
     read = read_campaign(write_campaign(campaign(drive), tmp_path / "c", run_format=run_format))
     found = read.runs[0].drive
     assert found is not None
@@ -63,10 +63,10 @@ def test_a_driven_run_may_have_no_spring_and_a_free_one_may_not(tmp_path: Path) 
 
 CLIPPED = np.clip(INPUT, -0.6, 0.6)
 BAD = {
-    "length": (Drive("moment_nm", INPUT[:-1]), "999 samples, the record 1000"),
-    "constant": (Drive("drive", np.full(TIME.size, 3.0)), "is constant"),
-    "itself": (Drive("drive", -4.0 * RESPONSE + 1.0), "is proportional to the response"),
-    "saturates": (Drive("moment_nm", CLIPPED), "saturates"),
+    "length": (Input("moment_nm", INPUT[:-1]), "999 samples, the record 1000"),
+    "constant": (Input("drive", np.full(TIME.size, 3.0)), "is constant"),
+    "itself": (Input("drive", -4.0 * RESPONSE + 1.0), "is proportional to the response"),
+    "saturates": (Input("moment_nm", CLIPPED), "saturates"),
 }
 
 
@@ -85,11 +85,11 @@ LEVELS = np.repeat(np.round(INPUT[::25] / np.abs(INPUT).max() * 2.0), 25)[: TIME
 
 @pytest.mark.parametrize("values", [np.sign(INPUT), np.round(INPUT * 20.0) / 20.0, INPUT, LEVELS])
 def test_square_waves_and_coarse_inputs_do_not_saturate(tmp_path: Path, values: np.ndarray) -> None:
-    write_campaign(campaign(Drive("moment_nm", values)), tmp_path / "c")
+    write_campaign(campaign(Input("moment_nm", values)), tmp_path / "c")
 
 
 def test_plausible_false_keeps_an_actuator_that_saturates(tmp_path: Path) -> None:
-    kept = replace(campaign(Drive("moment_nm", CLIPPED)), sensor=SensorProperties(100.0, plausible=False))
+    kept = replace(campaign(Input("moment_nm", CLIPPED)), sensor=SensorProperties(100.0, plausible=False))
     assert read_campaign(write_campaign(kept, tmp_path / "c")).runs[0].drive is not None
 
 
@@ -195,14 +195,14 @@ def test_an_input_on_another_clock_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("drive", "spring"),
     [
-        (Drive("moment_nm", INPUT, "zero"), 0.0),
-        (Drive("drive", INPUT, "zero", -2.5), 16.0),
-        (Drive("drive", INPUT, "linear"), 0.0),
-        (Drive("base_rad", 0.1 * INPUT, "zero"), 16.0),
-        (Drive("command_rad", 0.1 * INPUT, "zero", servo_kv=0.7), 16.0),
+        (Input("moment_nm", INPUT, "zero"), 0.0),
+        (Input("drive", INPUT, "zero", -2.5), 16.0),
+        (Input("drive", INPUT, "linear"), 0.0),
+        (Input("base_rad", 0.1 * INPUT, "zero"), 16.0),
+        (Input("command_rad", 0.1 * INPUT, "zero", servo_kv=0.7), 16.0),
     ],
 )
-def test_import_is_the_inverse_of_export(tmp_path: Path, kind: str, drive: Drive, spring: float) -> None:
+def test_import_is_the_inverse_of_export(tmp_path: Path, kind: str, drive: Input, spring: float) -> None:
     given = campaign(drive, spring)
     path = export_campaign(given, tmp_path / f"c.{kind}", kind)
     read = read_records([path], ImportChoices(cut=False)).campaign

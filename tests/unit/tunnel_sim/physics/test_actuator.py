@@ -27,11 +27,12 @@ from tunnel_sim.engine.virtual_campaign import plan_effects
 from tunnel_sim.files.plan_file import paper_plan
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.actuator import ActuatorLimits, InputSamples
-from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.forward import forward_motion
+from tunnel_sim.physics.input_moment import InputMoment
 from tunnel_sim.vocabulary.campaign import Campaign
-from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.input_kinds import INPUTS
+from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.plan import EffectSetting
 from tunnel_sim.vocabulary.record import Record
 
@@ -141,7 +142,7 @@ def test_a_limit_that_is_not_reached_changes_no_bit(limited: dict[str, float]) -
 @pytest.mark.parametrize("lag", [2e-3, 0.02, 0.5])
 def test_a_lagged_rig_moves_as_scipy_says(held: bool, lag: float) -> None:
     """An input that is white from sample to sample, 40 samples in a period of 0.4 s."""
-    run = replace(WIND_ON, duration=0.35, drive=DriveMoment(TIME, 3.0 * VALUES, held=held))
+    run = replace(WIND_ON, duration=0.35, drive=InputMoment(TIME, 3.0 * VALUES, held=held))
     chain = EffectChain(run, (effect_from("actuator_lag", {"lag": lag}),), (None,))
     found = forward_motion(load_rig(), chain.physics(), 1000.0)
     asked, law = InputSamples(TIME, 3.0 * VALUES, held), run.law(load_rig())
@@ -188,7 +189,7 @@ def test_the_line_that_takes_the_place_of_an_exponential_is_of_third_order(held:
     for parts in (1, 2, 8):
         times = np.linspace(0.0, TIME[-1], parts * (TIME.size - 1) + 1)
         values = at(InputSamples(TIME, 3.0 * VALUES, held), times + (1e-9 if held else 0.0))
-        run = replace(WIND_ON, duration=0.35, drive=DriveMoment(times, values, held=held))
+        run = replace(WIND_ON, duration=0.35, drive=InputMoment(times, values, held=held))
         chain = EffectChain(run, (effect_from("actuator_lag", {"lag": lag}),), (None,))
         angles.append(forward_motion(load_rig(), chain.physics(), 1000.0).angle)
     coarse, finer_one = (float(np.max(np.abs(angle - angles[-1]))) for angle in angles[:-1])
@@ -197,7 +198,7 @@ def test_the_line_that_takes_the_place_of_an_exponential_is_of_third_order(held:
 
 @each_hold
 def test_a_motion_is_continuous_where_the_lag_vanishes(held: bool) -> None:
-    run = replace(WIND_ON, duration=0.35, drive=DriveMoment(TIME, 3.0 * VALUES, held=held))
+    run = replace(WIND_ON, duration=0.35, drive=InputMoment(TIME, 3.0 * VALUES, held=held))
     angles = [
         forward_motion(
             load_rig(),
@@ -247,7 +248,7 @@ def test_a_constant_moment_beside_the_input_does_not_pass_through_the_actuator(n
 
 @pytest.mark.parametrize("name", NULL)
 def test_a_moving_root_has_no_actuator(name: str) -> None:
-    run = replace(WIND_ON, drive=replace(DRIVE, on_body=False))
+    run = replace(WIND_ON, drive=replace(DRIVE, kind=INPUTS["base_rad"]))
     chain = EffectChain(run, (effect_from(name, {NULL[name]: 0.1}),), (None,))
     assert chain.physics().drive.acting.values is not None
     assert np.array_equal(chain.physics().drive.acting.values, DRIVE.values)
@@ -266,7 +267,7 @@ def test_a_campaign_tries_them_where_a_moment_moves_the_body() -> None:
 
 
 def test_a_plan_whose_drive_moves_the_root_refuses_them_in_one_line() -> None:
-    drive = Drive("base_rad", np.sin(np.arange(100.0)))
+    drive = Input("base_rad", np.sin(np.arange(100.0)))
     plan = paper_plan()
     plan = replace(
         plan,
@@ -291,7 +292,7 @@ def through(**actuator: Any) -> Campaign:
         moment, _ = exerted(
             finer(run.drive.values[:, None], linear), Reference(**actuator), 0.125 / RATE, linear
         )
-        acting = DriveMoment(0.125 / RATE * np.arange(len(moment)), moment[:, 0])
+        acting = InputMoment(0.125 / RATE * np.arange(len(moment)), moment[:, 0])
         settings = replace(
             WIND_ON, wind_speed=0.0, spring_stiffness=SPRING, yaw_inertia=INERTIA, mechanical_damping=DAMPING,
             release_angle=0.02, duration=time.size / RATE, drive=acting,

@@ -30,7 +30,7 @@ TWO_OR_MORE = {
     "tunnel_sim/files/readers.py",  # more than one input
     "tunnel_sim/files/plausible.py",  # a decimal
     "tunnel_sim/physics/expression.py",  # characters beyond the limit
-    "tunnel_sim/vocabulary/drive.py",  # samples of a record
+    "tunnel_sim/vocabulary/inputs.py",  # samples of a record
     "tunnel_sim/vocabulary/record.py",  # samples of a record
     "diagnosis/model/joint.py",  # springs that differ
     "identification/examination/self_excited.py",  # cycles of a steady oscillation

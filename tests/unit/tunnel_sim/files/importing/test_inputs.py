@@ -15,7 +15,7 @@ from tests.support.import_files import decay, written
 from tunnel_sim import TunnelError
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.records import Imported, read_records
-from tunnel_sim.vocabulary.inputs import INPUTS, without_command
+from tunnel_sim.vocabulary.input_kinds import INPUTS, without_command
 from tunnel_sim.vocabulary.record import Array
 
 TIME = np.arange(2000) / 100.0

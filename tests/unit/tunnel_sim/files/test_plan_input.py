@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from tests.support.plans import planned
-from tunnel_sim.files.plan_drive import DriveTable
 from tunnel_sim.files.plan_file import PlanDocument, SensorModelTable, TruthTable
+from tunnel_sim.files.plan_input import InputTable
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import square
 
@@ -138,8 +138,8 @@ FILES = {
 
 def test_the_reference_page_has_every_key_and_kind() -> None:
     page = (Path(__file__).parents[4] / "docs" / "reference" / "plan.md").read_text(encoding="utf-8")
-    kinds = get_args(DriveTable.model_fields["kind"].annotation)
-    known = {*PlanDocument.model_fields, *DriveTable.model_fields, *kinds, *SensorModelTable.model_fields}
+    kinds = get_args(InputTable.model_fields["kind"].annotation)
+    known = {*PlanDocument.model_fields, *InputTable.model_fields, *kinds, *SensorModelTable.model_fields}
     shown = set(re.findall(r"`(?:\[+)?(\w+)(?:\]+)?`", page))
     assert known | set(TruthTable.model_fields) <= shown
 

@@ -7,8 +7,8 @@ import pytest
 
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.actuator import ActuatorLimits
-from tunnel_sim.physics.drive import DriveMoment
 from tunnel_sim.physics.forward import forward_motion, forward_run, integrate
+from tunnel_sim.physics.input_moment import InputMoment
 from tunnel_sim.physics.moment_law import parameter_vector
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.plan import AeroDerivatives
@@ -56,7 +56,7 @@ def jittered(rng, size=400):
 @pytest.mark.parametrize("held", [False, True], ids=["linear", "held"])
 def test_the_motion_is_that_of_the_samples(held, delay):
     """The difference falls faster than the square of the step."""
-    drive = DriveMoment(*jittered(np.random.default_rng(2)), delay=delay, held=held)
+    drive = InputMoment(*jittered(np.random.default_rng(2)), delay=delay, held=held)
     errors = []
     for step in (0.01, 0.005):
         exact = by_samples(drive, step)
@@ -66,7 +66,7 @@ def test_the_motion_is_that_of_the_samples(held, delay):
 
 
 def test_a_line_has_the_impulse_and_the_first_moment_of_the_input():
-    drive = DriveMoment(*jittered(np.random.default_rng(4)), delay=0.002)
+    drive = InputMoment(*jittered(np.random.default_rng(4)), delay=0.002)
     lines = drive.lines(0.02, 100, sampled=False)
     fine = np.linspace(0.0, 0.02, 20001)
     for start, value, slope in zip(lines.time_s, lines.values, lines.slopes, strict=True):
@@ -78,16 +78,16 @@ def test_a_line_has_the_impulse_and_the_first_moment_of_the_input():
 
 def test_equal_samples_have_the_same_lines():
     times, values = jittered(np.random.default_rng(6))
-    one = DriveMoment(times, values)
-    scaled = DriveMoment(one.time_s, one.values, scale=3.0)
+    one = InputMoment(times, values)
+    scaled = InputMoment(one.time_s, one.values, scale=3.0)
     assert one.lines(0.01, 300, sampled=False) is scaled.lines(0.01, 300, sampled=False)
-    assert one.lines(0.01, 300, sampled=False) is not DriveMoment(times, values).lines(
+    assert one.lines(0.01, 300, sampled=False) is not InputMoment(times, values).lines(
         0.01, 300, sampled=False
     )
 
 
 def test_samples_at_the_starts_of_steps_are_lines_as_they_are():
-    drive = DriveMoment(np.arange(5) * 0.1, np.array([1.0, 3.0, 2.0, 2.0, 5.0]))
+    drive = InputMoment(np.arange(5) * 0.1, np.array([1.0, 3.0, 2.0, 2.0, 5.0]))
     lines = drive.lines(0.05, 10, sampled=True)
     assert lines.values is drive.values
     assert lines.slopes == pytest.approx([20.0, -10.0, 0.0, 30.0, 0.0])
@@ -104,7 +104,7 @@ def test_the_response_to_even_samples_is_that_to_the_same_input_in_uneven_ones(h
     there = values[100] if held else 0.5 * (values[100] + values[101])
     ends, root = np.arange(0.0, 2.9, 0.03), complex(-0.7, 40.0)
     even, uneven = (
-        DriveMoment(t, v, delay=delay, held=held, actuator=ActuatorLimits(lag=lag)).mode(root, ends)
+        InputMoment(t, v, delay=delay, held=held, actuator=ActuatorLimits(lag=lag)).mode(root, ends)
         for t, v in ((time, values), (np.insert(time, 101, among), np.insert(values, 101, there)))
     )
     within = 1e-4 if lag else 1e-9  # a response with a lag is a line in each interval, however short
@@ -112,7 +112,7 @@ def test_the_response_to_even_samples_is_that_to_the_same_input_in_uneven_ones(h
 
 
 def test_the_samples_behind_an_actuator_are_computed_once_for_equal_inputs():
-    drive = DriveMoment(np.arange(50) * 0.1, np.sin(np.arange(50.0)), actuator=ActuatorLimits(lag=0.3))
+    drive = InputMoment(np.arange(50) * 0.1, np.sin(np.arange(50.0)), actuator=ActuatorLimits(lag=0.3))
     later = replace(drive, delay=0.05, offset=1.0)
     assert later.exerted.values is drive.exerted.values
     assert later.exerted.time_s is drive.exerted.time_s

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from tunnel_sim.physics.actuator import DIRECT, ActuatorLimits, InputSamples, recurrence
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.input_kinds import INPUTS, InputKind
+from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.quantities import (
     Moments,
     Number,
@@ -45,7 +47,7 @@ class Lines:
 
 
 @dataclass(frozen=True, eq=False)
-class DriveMoment:
+class InputMoment:
     """The moment of a drive: linear or constant between its samples, constant before the first and after the last.
 
     Args:
@@ -53,10 +55,9 @@ class DriveMoment:
         values: at these times, in any unit.
         scale: N m per unit.
         delay: time by which it acts later than its samples, s.
-        on_body: whether it acts on the body; else on the rod's upper end, as the spring does.
+        kind: of the input.
         actuator: limits and lag between the samples and the body.
         offset: an added constant moment, which does not pass through the actuator, N m.
-        by_actuator: whether it is the demand on an actuator, where it acts on the body.
     """
 
     time_s: Times
@@ -64,10 +65,9 @@ class DriveMoment:
     scale: float = 1.0
     delay: float = 0.0
     held: bool = False
-    on_body: bool = True
+    kind: InputKind = INPUTS["moment_nm"]
     actuator: ActuatorLimits = DIRECT
     offset: float = 0.0
-    by_actuator: bool = True
 
     def __post_init__(self) -> None:
         """Copy and check the samples."""
@@ -79,19 +79,29 @@ class DriveMoment:
             remedy = "correct the sampled input"
             raise TunnelError("a drive needs as many finite values as times, and at least one", remedy=remedy)
 
+    @classmethod
+    def of(cls, given: Input, time_s: Times, scale: float, delay: Seconds = 0.0) -> InputMoment:
+        """The moment of a run's input, whose samples are at some times since the run's start."""
+        return cls(time_s, given.values, scale, delay, given.held, given.kind)
+
+    @property
+    def on_body(self) -> bool:
+        """Whether it acts on the body; else on the rod's upper end, as the spring does."""
+        return not self.kind.of_spring
+
     @cached_property
-    def exerted(self) -> DriveMoment:
+    def exerted(self) -> InputMoment:
         """The moment behind the actuator, as samples and an offset; none where the scale is 0."""
         offset = self.offset if self.scale else 0.0
         if self.actuator == DIRECT and offset == self.offset:
             return self
         given = _exerted(Same(self.time_s), Same(self.values), self.held, self.actuator, self.scale)
-        return DriveMoment(
-            given.time_s, given.values, self.scale, self.delay, given.held, self.on_body, offset=offset
+        return InputMoment(
+            given.time_s, given.values, self.scale, self.delay, given.held, self.kind, offset=offset
         )
 
     @cached_property
-    def acting(self) -> DriveMoment:
+    def acting(self) -> InputMoment:
         """The acting moment, as samples without an actuator or an offset."""
         exerted = self.exerted
         if not exerted.offset:
@@ -102,11 +112,6 @@ class DriveMoment:
     def interval(self) -> Seconds:
         """Time between its samples; 0 where they are not even."""
         return _interval(Same(self.time_s))
-
-    @property
-    def through_actuator(self) -> bool:
-        """Whether it is a moment exerted by an actuator, which the effects of an actuator change."""
-        return self.on_body and self.by_actuator
 
     @property
     def as_sampled(self) -> bool:
@@ -195,14 +200,14 @@ class DriveMoment:
         return self.scale * _mode(*of, root, Same(time_s))
 
 
-def _pieces(drive: DriveMoment, starts: Times) -> tuple[PerSample, PerSample]:
+def _pieces(drive: InputMoment, starts: Times) -> tuple[PerSample, PerSample]:
     """Level and slope, per s, of an input's delayed samples from given times since the run's start on."""
     kinks = drive.time_s + drive.delay
     return _levels(drive, kinks, np.searchsorted(kinks, starts, side="right") - 1, starts)
 
 
 def _levels(
-    drive: DriveMoment, kinks: Times, piece: NDArray[np.intp], starts: Times
+    drive: InputMoment, kinks: Times, piece: NDArray[np.intp], starts: Times
 ) -> tuple[PerSample, PerSample]:
     """As `_pieces`, of known pieces between the delayed samples; −1 before the first."""
     at = np.clip(piece, 0, kinks.size - 1)
@@ -211,7 +216,7 @@ def _levels(
     return drive.values[at] + slope * (starts - kinks[at]), slope
 
 
-def _impulses(drive: DriveMoment, ends: Times) -> tuple[Array, Array]:
+def _impulses(drive: InputMoment, ends: Times) -> tuple[Array, Array]:
     """Impulses of an input's delayed samples between times, and their first moments about the earlier time."""
     kinks = drive.time_s + drive.delay
     inside = kinks[(kinks > ends[0]) & (kinks < ends[-1])]
@@ -249,7 +254,7 @@ def _is_finite(values: Same) -> bool:
 
 @lru_cache(maxsize=64)
 def _interval(time_s: Same) -> Seconds:
-    """As `DriveMoment.interval`."""
+    """As `InputMoment.interval`."""
     times = time_s.array
     interval = float(times[-1] - times[0]) / max(1, times.size - 1)
     even = times[0] + interval * np.arange(times.size)
@@ -265,7 +270,7 @@ def _exerted(time_s: Same, values: Same, held: bool, actuator: ActuatorLimits, s
 
 @lru_cache(maxsize=64)
 def _lines_of_samples(time_s: Same, values: Same, held: bool, delay: float) -> Lines:
-    drive = DriveMoment(time_s.array, values.array, delay=delay, held=held)
+    drive = InputMoment(time_s.array, values.array, delay=delay, held=held)
     rise = 0.0 if held else np.diff(drive.values) / drive.interval
     slopes = np.append(np.broadcast_to(rise, drive.values.size - 1), 0.0)
     return Lines(drive.time_s, drive.values, read_only(slopes), drive.interval, delay)
@@ -274,7 +279,7 @@ def _lines_of_samples(time_s: Same, values: Same, held: bool, delay: float) -> L
 @lru_cache(maxsize=64)
 def _lines_of_steps(time_s: Same, values: Same, held: bool, delay: float, step: Seconds, steps: int) -> Lines:
     ends = np.asarray(step * np.arange(steps + 1), np.float64)
-    impulse, product = _impulses(DriveMoment(time_s.array, values.array, delay=delay, held=held), ends)
+    impulse, product = _impulses(InputMoment(time_s.array, values.array, delay=delay, held=held), ends)
     slopes = 12.0 * (product - impulse * step / 2.0) / step**3
     return Lines(
         read_only(ends[:-1]), read_only(impulse / step - slopes * step / 2.0), read_only(slopes), step
@@ -307,7 +312,7 @@ class _Course:
 
 @lru_cache(maxsize=64)
 def _course(times: Same, values: Same, held: bool, delay: float, at: Same) -> _Course:
-    drive, time_s = DriveMoment(times.array, values.array, delay=delay, held=held), at.array
+    drive, time_s = InputMoment(times.array, values.array, delay=delay, held=held), at.array
     within = _EVEN * drive.interval
     kinks = drive.time_s + delay
     starts = np.concatenate([[0.0], kinks[kinks > within]])
@@ -336,7 +341,7 @@ def _course(times: Same, values: Same, held: bool, delay: float, at: Same) -> _C
 
 @lru_cache(maxsize=64)
 def _mode(times: Same, values: Same, held: bool, delay: float, root: complex, at: Same) -> np.ndarray:
-    """As `DriveMoment.mode`, in the unit of the samples and s."""
+    """As `InputMoment.mode`, in the unit of the samples and s."""
     course = _course(times, values, held, delay, at)
 
     def weights(since: Array) -> tuple[np.ndarray, np.ndarray]:  # of level and slope, from z = 0

@@ -11,9 +11,9 @@ from pydantic import Field
 
 from tunnel_sim.files.run_files import read_input
 from tunnel_sim.files.toml_input import OneLine, Positive, StrictModel
-from tunnel_sim.vocabulary.drive import Drive, Hold
 from tunnel_sim.vocabulary.errors import TunnelError, one_of
-from tunnel_sim.vocabulary.inputs import INPUTS, KINDS, InputColumn
+from tunnel_sim.vocabulary.input_kinds import INPUTS, KINDS, InputColumn
+from tunnel_sim.vocabulary.inputs import Hold, Input
 from tunnel_sim.vocabulary.plan import band_noise, chirp, lines_in_band, multisine, square, stepped_sine
 from tunnel_sim.vocabulary.quantities import Times
 
@@ -36,7 +36,7 @@ _OF_GAIN = tuple(kind for kind in _OF_AMPLITUDES.values() if kind.takes_gain)
 _OPTIONAL = ("frequency_hz", "frequencies_hz", "from_hz", "to_hz", "file", "seed", "gain", *_OF_AMPLITUDES)
 
 
-class DriveTable(StrictModel):
+class InputTable(StrictModel):
     """``[drive]``."""
 
     kind: Kind = Field(
@@ -81,7 +81,7 @@ class DriveTable(StrictModel):
         return next(kind.column for name, kind in _OF_AMPLITUDES.items() if getattr(self, name))
 
 
-def check_drive(table: DriveTable, samples: int, sample_rate: float, where: str) -> None:
+def check_input_table(table: InputTable, samples: int, sample_rate: float, where: str) -> None:
     """Refuse a drive with a missing key, with a key that its kind does not take, or too fast for the samples.
 
     Args:
@@ -92,7 +92,7 @@ def check_drive(table: DriveTable, samples: int, sample_rate: float, where: str)
     needed = _NEEDS[table.kind]
     for name in needed:
         if name not in given:
-            remedy = f"give {name} as {DriveTable.model_fields[name].description}"
+            remedy = f"give {name} as {InputTable.model_fields[name].description}"
             raise TunnelError(f"kind = '{table.kind}' needs {name}", where=where, remedy=remedy)
     taken = (
         *needed,
@@ -145,7 +145,7 @@ def _check_sampled(name: str, frequency: float | None, sample_rate: float, where
         raise TunnelError(what, where=where, remedy="lower it, or raise sample_rate under [sensor]")
 
 
-def drive_of_run(table: DriveTable, amplitude: float, number: int, time_s: Times) -> Drive:
+def input_of_run(table: InputTable, amplitude: float, number: int, time_s: Times) -> Input:
     """The input of one driven run, unless a file gives it.
 
     Args:
@@ -165,10 +165,10 @@ def drive_of_run(table: DriveTable, amplitude: float, number: int, time_s: Times
             wave = band_noise(time_s, low, high, rng)
         case _:
             wave = stepped_sine(time_s, table.frequencies_hz or [table.frequency_hz or 0.0])
-    return Drive(table.column, amplitude * wave, table.hold)
+    return Input(table.column, amplitude * wave, table.hold)
 
 
-def drive_of_file(path: Path, time_s: Times, table: DriveTable, where: str) -> Drive:
+def input_of_file(path: Path, time_s: Times, table: InputTable, where: str) -> Input:
     """The input of a file at the times of the samples from 0 on, its first value at time 0."""
     given, column, values = read_input(path, where)
     hold = table.hold
@@ -188,4 +188,4 @@ def drive_of_file(path: Path, time_s: Times, table: DriveTable, where: str) -> D
     if np.ptp(sampled) == 0.0:
         remedy = "give an input that changes"
         raise TunnelError(f"the column {column} is constant", where=where, remedy=remedy)
-    return Drive(column, sampled, hold)
+    return Input(column, sampled, hold)
