@@ -182,17 +182,15 @@ class SettingsTable:
         """The parameters of the moment law; a view."""
         return self.numbers[:, : len(parameter_names())]
 
-    def _lists(self, rows: slice) -> tuple[list[Any], ...]:
-        return tuple(given[rows] for given in (self.series, self.rod_twist, self.program, self.drive))
-
-    def copy(self) -> SettingsTable:
-        """An independent copy of the table."""
-        return SettingsTable(self.numbers.copy(), *self._lists(slice(None)))
+    def copy(self, rows: slice = slice(None)) -> SettingsTable:
+        """An independent copy of the table, or of some of its runs."""
+        numbers, series, rods = self.numbers[rows].copy(), self.series[rows], self.rod_twist[rows]
+        return SettingsTable(numbers, series, rods, self.program[rows], self.drive[rows])
 
     def row(self, place: int) -> RunSettings:
-        """One run, as it is now; its numbers are not checked again."""
-        run, rows = RunSettings.__new__(RunSettings), slice(place, place + 1)
-        object.__setattr__(run, "table", SettingsTable(self.numbers[rows].copy(), *self._lists(rows)))
+        """One run as it is now, without the checks of `RunSettings`: a fit may try any number."""
+        run = RunSettings.__new__(RunSettings)
+        object.__setattr__(run, "table", self.copy(slice(place, place + 1)))
         return run
 
     def put(self, place: int, run: RunSettings) -> None:
@@ -264,7 +262,7 @@ class SettingsTable:
 
 
 class _Field:
-    """A field of a run that the run's table keeps under the same name."""
+    """A field of `RunSettings`, which the run's table keeps under the same name."""
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
@@ -330,7 +328,7 @@ class RunSettings:
     """The physics of one run: a row of a `SettingsTable`.
 
     Args:
-        table: of this run alone.
+        table: of this run alone, which holds all other fields.
         spring_stiffness: Kr, N m/rad.
         derivatives: Cnβ and Cnr, 1/rad.
         yaw_inertia: Izz, kg m².
