@@ -257,13 +257,40 @@ def _evident(top: Hypothesis, kinds: Sequence[type[Effect]]) -> list[Hypothesis]
         return []
     able = {kind.name: kind for kind in kinds if not issubclass(kind, Periodic)}
     larger = sets_with_one_more([top], list(able.values()))
-    gains = []
-    for h in larger:
-        kind = able[h.effects[-1]]
-        numbers = 1 + len(kind.per_run_parameters(h.fit.problem.instants)) * len(h.fit.problem.data.runs)
-        gains.append((top.fit.total - h.fit.total) / overdispersion(h.fit, kind) / numbers)
+    gains = [_gain(h, able[h.effects[-1]], top.fit) for h in larger]
     order = sorted(range(len(larger)), key=lambda i: -gains[i])
     return [larger[i] for i in order if gains[i] > EVIDENT_FROM]
+
+
+def _gain(larger: Hypothesis, kind: type[Effect], without: Fit) -> float:
+    """Drop of χ² by an effect for each of its numbers, over what chance multiplies it by."""
+    drop = without.total - larger.fit.total
+    return drop / overdispersion(larger.fit, kind) / _numbers(larger.fit, kind)
+
+
+def _numbers(fitted: Fit, kind: type[Effect]) -> int:
+    """Numbers of an effect that chance may fit: its severity, and the instants and phases of every run."""
+    problem = fitted.problem
+    return 1 + len(kind.per_run_parameters(problem.instants)) * len(problem.data.runs)
+
+
+def _needed(top: Hypothesis) -> Hypothesis:
+    """The set without effects that are not evident beside the random moment.
+
+    An effect with a phase in every run, as vortices have, may gain weight by them without being evident.
+    """
+    known = top.fit
+    for kind in known.problem.effects:
+        severity, reach = f"{kind.name}.{kind.parameters()[0].name}", EVIDENT_FROM * _numbers(known, kind)
+        if severity not in known.problem.names:
+            continue
+        if known.value(severity) ** 2 < reach * known.std(severity) ** 2:
+            rest = tuple(name for name in top.effects if name != kind.name)
+            start = restricted(known, rest)
+            without = try_fit(start.problem, start.point)
+            if without is not None and _gain(top, kind, without) < EVIDENT_FROM:
+                return _needed(replace(top, effects=rest, fit=without, textbook=None))
+    return top
 
 
 def _may_act(source: MomentSource, best: Hypothesis, scale: Scale) -> bool:
@@ -451,7 +478,7 @@ def _settled(
             # a random moment leaves little of a gap for comparing effects where it acts: more are added while one
             # seen there alone is evident, the most evident of all, so that none absorbs the residual of another
             exchanges |= _exchanges([found, *sets])
-            top = _sought_again(found)
+            top = _needed(_sought_again(found))
             further = _evident(top, kinds)
             while any(h.effects[-1] in hidden for h in further):
                 top, exchanges = further[0], exchanges | _exchanges(further)

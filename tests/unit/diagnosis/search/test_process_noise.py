@@ -30,6 +30,7 @@ from tests.support.gap_campaigns import (
     DURATION,
     INERTIA,
     INTERVAL,
+    added,
     campaign,
     nominal,
     whole_runs,
@@ -490,3 +491,13 @@ def test_turbulence_about_a_frequency_is_recovered():
     assert centred is not None
     assert centred.spectrum[0].centre == pytest.approx(5.0, rel=0.1)
     assert centred.cost < broad.cost - 100.0
+
+
+def test_an_effect_that_is_not_evident_beside_a_random_moment_goes():
+    """Vortices have a phase in every run, so they fit some of any random motion; the friction is there."""
+    known = campaign(effect_from("coulomb_friction", {"friction_moment": 0.004}))
+    base = nominal(buffeted(known, 3e-3, 1.0))
+    noisy = replace(base.problem, data=with_response(base, (SpectrumPart(3e-3, 1.0, source=STREAM),)))
+    fitted = added(fit(noisy, base.point), "coulomb_friction", "vortex_shedding")
+    both = Hypothesis(("coulomb_friction", "vortex_shedding"), fitted)
+    assert random_moments._needed(both).effects == ("coulomb_friction",)
