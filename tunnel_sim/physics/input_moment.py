@@ -48,7 +48,7 @@ class Lines:
 
 @dataclass(frozen=True, eq=False)
 class InputMoment:
-    """The moment of a drive: linear or constant between its samples, constant before the first and after the last.
+    """The moment of an input: linear or constant between its samples, constant before the first and after the last.
 
     Args:
         time_s: of the samples, since the run's start, increasing.
@@ -76,8 +76,8 @@ class InputMoment:
         finite = all(map(isfinite, (self.scale, self.delay, self.offset)))
         finite = finite and _is_finite(Same(self.time_s)) and _is_finite(Same(self.values))
         if self.time_s.shape != self.values.shape or not self.time_s.size or not finite:
-            remedy = "correct the sampled input"
-            raise TunnelError("a drive needs as many finite values as times, and at least one", remedy=remedy)
+            what = "an input needs as many finite values as times, and at least one"
+            raise TunnelError(what, remedy="correct the sampled input")
 
     @classmethod
     def of(cls, given: Input, time_s: Times, scale: float, delay: Seconds = 0.0) -> InputMoment:
