@@ -15,7 +15,7 @@ from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.vocabulary.errors import TunnelError, counted
 
 if TYPE_CHECKING:
-    from tunnel_sim.files.importing.columns import ColumnPair
+    from tunnel_sim.files.importing.columns import RunColumns
     from tunnel_sim.files.importing.tables import Channel, Table
 
 MOST_COLUMNS = 8
@@ -110,7 +110,7 @@ def columns_of(session: Session) -> list[Column]:
 
 
 def _column(
-    channel: Channel, channels: Sequence[Channel], pairs: list[ColumnPair], choices: ImportChoices
+    channel: Channel, channels: Sequence[Channel], pairs: list[RunColumns], choices: ImportChoices
 ) -> Column:
     import numpy as np
 
@@ -121,14 +121,14 @@ def _column(
     from tunnel_sim.files.importing.tables import is_input
 
     role: Role
-    if any(channel is pair.time for pair in pairs) or (not pairs and is_time(channel)):
+    if any(channel is pair.time.channel for pair in pairs) or (not pairs and is_time(channel)):
         role, used, stated = "time", True, choices.time_unit
     elif condition_of(channel.name, channel.unit) is not None:
         return Column(channel.name, channel.unit, "a condition of the runs", "condition", True)
     elif is_input(channel) or channel is stated_input(channels, choices):
         return Column(channel.name, channel.unit, "the input of a driven run", "input", True)
     else:
-        used = any(channel is pair.reading for pair in pairs)
+        used = any(channel is pair.reading.channel for pair in pairs)
         role, stated = "angle", choices.unit if used else None
     if stated is not None:
         return Column(channel.name, stated, "stated here", role, used)

@@ -195,8 +195,8 @@ def from_zero(time: Times) -> Times:
     return counted
 
 
-def from_rest(reading: PerSample, rest: float, unit: str, said: list[str], where: str) -> PerSample:
-    """A reading without its value at rest.
+def from_rest(reading: PerSample, rest: float, unit: str, where: str) -> tuple[PerSample, str]:
+    """A reading without its value at rest, and a remark.
 
     Args:
         rest: as stated, in the unit of the reading.
@@ -208,8 +208,7 @@ def from_rest(reading: PerSample, rest: float, unit: str, said: list[str], where
             where=where,
             remedy=f"state the reading at rest in {unit}, for each run where they differ",
         )
-    said.append(f"the stated reading at rest, {rest:.6g} {unit}, is subtracted")
-    return reading - rest
+    return reading - rest, f"the stated reading at rest, {rest:.6g} {unit}, is subtracted"
 
 
 def resolution(readings: Sequence[PerSample]) -> float | None:

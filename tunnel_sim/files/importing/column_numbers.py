@@ -13,12 +13,12 @@ from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.column_names import listed, named_kind, names_voltage
 from tunnel_sim.files.importing.remarks import doubt
 from tunnel_sim.files.importing.source import read_source
-from tunnel_sim.files.importing.tables import Channel
+from tunnel_sim.files.importing.tables import NO_CHANNEL, Channel, RunColumn
 from tunnel_sim.files.importing.units import UNITS, kind_of, known_unit, written_unit
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import Quantity
 from tunnel_sim.vocabulary.errors import TunnelError, counted, one_line, shown
-from tunnel_sim.vocabulary.quantities import PerSample, Readings, Rows
+from tunnel_sim.vocabulary.quantities import PerSample, Rows
 
 _COUNTERS = (2.0**8, 2.0**10, 2.0**12, 2.0**14, 2.0**16, 2.0**24, 2.0**32)
 _TURNS = (2.0 * pi, 360.0)
@@ -55,8 +55,8 @@ Calibration = tuple[PerSample, PerSample] | tuple[float, float]
 """Voltages and readings of a table; or offset and factor of a straight line."""
 
 
-def without_overflow(values: Rows, said: list[str]) -> Rows:
-    """Readings of a counter or a single-turn sensor without jumps at the ends of its range, which are reported."""
+def without_overflow(values: Rows) -> tuple[Rows, list[str]]:
+    """Readings of a counter or a single-turn sensor without jumps at the ends of its range; and remarks."""
     known = np.flatnonzero(np.isfinite(values))
     numbers = values[known]
     steps = np.diff(numbers)
@@ -71,12 +71,12 @@ def without_overflow(values: Rows, said: list[str]) -> Rows:
         others = float(np.abs(steps[~jumps]).max())
         if others > _SMALL * full or (full - np.abs(steps[jumps]) > _NEAR_END * others).any():
             continue
-        said.append(f"{counted(int(jumps.sum()), 'jump')} by {full:.6g} taken out (overflow of the counter)")
+        remark = f"{counted(int(jumps.sum()), 'jump')} by {full:.6g} taken out (overflow of the counter)"
         turns = np.concatenate([[0.0], np.cumsum(np.where(jumps, -np.sign(steps), 0.0))])
         result = values.copy()
         result[known] = numbers + full * turns
-        return result
-    return values
+        return result, [remark]
+    return values, []
 
 
 def stated_unit(text: str | None, kinds: Sequence[str], option: str) -> str | None:
@@ -120,23 +120,18 @@ def guessed_angle_unit(values: Rows) -> tuple[str, float]:
 
 
 def in_seconds(
-    times: Channel | None,
-    count: int,
-    facts: Mapping[str, float],
-    choices: ImportChoices,
-    said: list[str],
-    where: str,
-) -> Rows:
+    times: Channel, count: int, facts: Mapping[str, float], choices: ImportChoices, where: str
+) -> RunColumn:
     """The times of a run, s: from their column, or of a count of rows at the stated rate; guesses are reported."""
-    if times is None:
+    if times is NO_CHANNEL:
         interval, origin = sample_interval(facts, choices)
         if interval is None:
             option = "--time NAME"
             remedy = f"give {option}, or --rate in Hz"
             raise TunnelError("no column of times", where=where, remedy=remedy, options=(option,))
-        said.append(f"times at {1.0 / interval:.6g} Hz: {origin}")
-        return np.arange(count, dtype=np.float64) * interval
-    values = without_overflow(times.values, said)
+        why = f"times at {1.0 / interval:.6g} Hz: {origin}"
+        return RunColumn(NO_CHANNEL, np.arange(count, dtype=np.float64) * interval, "s", "time", (why,))
+    values, remarks = without_overflow(times.values)
     unit = stated_unit(choices.time_unit, ("time",), "--time-unit") or times.unit
     if unit and kind_of(unit) != "time":
         what = f"'{one_line(times.name, 40)}' is in '{one_line(unit, 20)}', which is not a unit of time"
@@ -146,8 +141,9 @@ def in_seconds(
         _ask_for_unit(times, ("time",), "--time-unit", where)
         unit, step = guessed_time_unit(values)
         taken = f"the file states no unit of the times: steps of {step:.4g} are taken as {unit}"
-        said.append(doubt(f"{taken}; --time-unit changes this"))
-    return values * UNITS["time"][unit] if unit != "s" else values
+        remarks.append(doubt(f"{taken}; --time-unit changes this"))
+    values = values * UNITS["time"][unit] if unit != "s" else values
+    return RunColumn(times, values, unit, "time", tuple(remarks))
 
 
 def _ask_for_unit(channel: Channel, kinds: Sequence[str], option: str, where: str) -> None:
@@ -184,9 +180,13 @@ def refuse_without_unit(channels: Sequence[Channel], where: str) -> None:
 
 
 def in_radians(
-    reading: Channel, choices: ImportChoices, calibration: Calibration | None, said: list[str], where: str
-) -> tuple[Readings, Quantity, str]:
-    """Readings in rad, rad/s or rad/s², their quantity, and their assumed unit."""
+    reading: Channel, timed: Rows, choices: ImportChoices, calibration: Calibration | None, where: str
+) -> RunColumn:
+    """Readings in rad, rad/s or rad/s²; the role is their quantity.
+
+    Args:
+        timed: the readings of the column, NaN where there is no time.
+    """
     kinds = ("angle", "counts", "voltage", "rate", "acceleration")
     unit = stated_unit(choices.unit, kinds, "--unit") or reading.unit
     if unit and kind_of(unit) not in kinds and choices.counts_per_turn is None and calibration is None:
@@ -195,7 +195,7 @@ def in_radians(
             where=where,
             remedy=f"give --unit ({', '.join(UNITS['angle'])} or another), --counts-per-turn N or --calibration",
         )
-    values = reading.values
+    values, remarks = without_overflow(timed)
     if not np.isfinite(values).any():
         what = f"'{one_line(reading.name, 40)}' holds no number where the file states a time"
         raise TunnelError(what, where=where, remedy="leave the file out, or name another column by --angle")
@@ -213,10 +213,10 @@ def in_radians(
         else:
             values = np.interp(volts, first, second)
         unit = unit if kind_of(unit) == "angle" else ""
-        said.append(f"'{reading.name}' converted by the calibration")
+        remarks.append(f"'{reading.name}' converted by the calibration")
     elif choices.counts_per_turn is not None:
         values, unit = values / choices.counts_per_turn, "turns"
-        said.append(f"'{reading.name}' holds counts, {choices.counts_per_turn:g} per turn")
+        remarks.append(f"'{reading.name}' holds counts, {choices.counts_per_turn:g} per turn")
     if kind_of(unit) in ("counts", "voltage"):
         option = "--counts-per-turn N" if kind_of(unit) == "counts" else '--calibration "a + b*V"'
         what = f"'{reading.name}' is in {unit}"
@@ -232,7 +232,7 @@ def in_radians(
                 raise TunnelError(what, where=where, remedy=remedy, options=(option,))
         unit, swing = guessed_angle_unit(values)
         no_unit, change = f"the file states no unit of '{reading.name}'", "--unit changes this"
-        said.append(
+        remarks.append(
             doubt(
                 f"{no_unit}: a swing of ±{swing:.4g} is taken as {unit}; {change}",
                 f"{no_unit}: it is taken as {unit}; {change}",
@@ -249,7 +249,7 @@ def in_radians(
         option = "--counts-per-turn N"
         remedy = f"give {option} for an encoder, or --unit deg if it does"
         raise TunnelError(what, where=where, remedy=remedy, options=(option,))
-    return values, quantity, unit
+    return RunColumn(reading, values, unit, quantity, tuple(remarks))
 
 
 def _straight_line(text: str) -> tuple[float, float] | None:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import groupby
 from typing import NoReturn
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.column_names import (
@@ -26,11 +28,9 @@ from tunnel_sim.files.importing.column_numbers import (
     in_radians,
     in_seconds,
     refuse_without_unit,
-    without_overflow,
 )
 from tunnel_sim.files.importing.condition_names import condition_of, resembles
 from tunnel_sim.files.importing.inputs import (
-    RunInput,
     find_input,
     moves_before,
     names_command,
@@ -38,12 +38,10 @@ from tunnel_sim.files.importing.inputs import (
     stated_input,
 )
 from tunnel_sim.files.importing.remarks import doubt
-from tunnel_sim.files.importing.tables import Channel, Table, is_input
+from tunnel_sim.files.importing.tables import NO_CHANNEL, Channel, RunColumn, Table, is_input
 from tunnel_sim.files.importing.units import claims, kind_of
-from tunnel_sim.vocabulary.campaign import Quantity
 from tunnel_sim.vocabulary.errors import TunnelError, attempt, did_you_mean, joined, one_line
 from tunnel_sim.vocabulary.input_kinds import without_command
-from tunnel_sim.vocabulary.quantities import Readings, Rows
 
 _HEAD = 20_000  # samples of a column without a name that are inspected
 _STEADY = 0.5  # of the usual step: the steps of a clock differ by less
@@ -55,99 +53,86 @@ _HARDLY = 0.02  # of the span of another column in the same unit
 _DERIVATIVE = 0.9  # correlation with the derivative of another column, from which a column is its rate
 
 
-class Unread(TunnelError):
-    """Columns of times and readings whose units or rate are to be stated."""
+@dataclass(frozen=True, eq=False)
+class RunColumns:
+    """The columns of one run: as in the file, and then as numbers, NaN where there is none.
 
-    def __init__(self, fault: TunnelError, columns: tuple[Channel | None, Channel]) -> None:
+    Args:
+        run: its name in the table.
+        input: None for a free decay.
+        said: remarks, first on the choice of the columns, then on their numbers.
+    """
+
+    run: str
+    time: RunColumn
+    reading: RunColumn
+    input: RunColumn | None = None
+    said: tuple[str, ...] = ()
+
+    @property
+    def used(self) -> tuple[Channel, ...]:
+        """The columns of times, reading and input."""
+        rows = (self.time, self.reading, self.input)
+        return tuple(row.channel for row in rows if row is not None)
+
+
+class Unread(TunnelError):
+    """What is to be stated of the columns of a run: units, a rate, or which of several is meant."""
+
+    def __init__(self, fault: TunnelError, columns: RunColumns) -> None:
         super().__init__(
             fault.what, where=fault.where, remedy=fault.remedy, options=fault.options, parts=fault.parts
         )
         self.columns = columns
 
 
-@dataclass(frozen=True, eq=False)
-class ColumnPair:
-    """The columns of one run and its name in the table; without times the samples follow at a sample rate."""
-
-    run: str
-    time: Channel | None
-    reading: Channel
-    said: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, eq=False)
-class RunColumns:
-    """The columns of one run, as numbers.
-
-    Args:
-        pair: the columns themselves.
-        time: s; NaN where there is no number, as in the reading.
-        reading: rad, rad/s or rad/s², by the quantity.
-        unit: of the reading in the file, stated or assumed.
-        input: None for a free decay.
-    """
-
-    pair: ColumnPair
-    time: Rows
-    reading: Rows
-    quantity: Quantity
-    unit: str
-    input: RunInput | None
-    said: tuple[str, ...]
-
-    @property
-    def used(self) -> tuple[Channel | None, ...]:
-        """The columns of times, reading and input; None where there is none."""
-        return self.pair.time, self.pair.reading, None if self.input is None else self.input.channel
-
-
 def find_columns(
-    table: Table,
-    choices: ImportChoices,
-    calibration: Calibration | None,
-    where: str,
+    table: Table, choices: ImportChoices, calibration: Calibration | None, where: str
 ) -> list[RunColumns]:
     """The columns of each run of a table, at least one run; guesses are reported.
 
     Raises:
         Unread: for all that is to be stated of the columns of a run.
     """
-    found = []
     several: list[TunnelError] = []  # all that is to be stated of a file is asked for at once
     try:
-        pairs = find_pairs(table, choices, where)
+        runs = find_pairs(table, choices, where)
     except Unread as fault:  # the first of several columns that may be the angle, and what it asks for
-        several, pairs = [fault], [ColumnPair("", *fault.columns)]
-    for pair in pairs:
-        said = [*pair.said]
-        faults = [*several]
-        rows, facts = pair.reading.values.size, table.facts
-        time = attempt(faults, lambda: in_seconds(pair.time, rows, facts, choices, said, where))  # noqa: B023
-        # A row without a time is not a sample: a heading between two runs may hold other numbers.
-        values = pair.reading.values
-        timed = values if time is None else np.where(np.isfinite(time), values, np.nan)
-        counted = replace(pair.reading, values=without_overflow(timed, said))
-        found_reading = attempt(
-            faults,
-            lambda: in_radians(counted, choices, calibration, said, where),  # noqa: B023
-        )
-        driven = None
-        if found_reading is not None:
-            reading, quantity, unit = found_reading
-            columns = table.channels, (pair.time, pair.reading)
-            driven = attempt(
-                faults,
-                lambda: find_input(*columns, reading, choices, said, where, unit),  # noqa: B023
-            )
-        if time is None or found_reading is None or faults:
-            raise Unread(joined(faults), (pair.time, pair.reading))
-        if table.native:
-            said += _apart(table, pair.reading, driven, choices, where)
-            reading = reading if driven is None else _within(reading, driven, said)
-        found.append(RunColumns(pair, time, reading, quantity, unit, driven, tuple(said)))
+        several, runs = [fault], [fault.columns]
+    found = [_as_numbers(table, run, choices, calibration, where, several) for run in runs]
     if len(found) == 1:  # beside several runs, other columns are those of other runs
         found = [replace(found[0], said=(*found[0].said, *_unused(table, found[0], choices)))]
     return found
+
+
+def _as_numbers(
+    table: Table,
+    run: RunColumns,
+    choices: ImportChoices,
+    calibration: Calibration | None,
+    where: str,
+    asked: Sequence[TunnelError],
+) -> RunColumns:
+    """The columns of a run in seconds and radians, and its input; ``asked``: what is to be stated already."""
+    faults = [*asked]
+    clock, channel = run.time.channel, run.reading.channel
+    rows, facts = channel.values.size, table.facts
+    time = attempt(faults, lambda: in_seconds(clock, rows, facts, choices, where))
+    # A row without a time is not a sample: a heading between two runs may hold other numbers.
+    timed = channel.values if time is None else np.where(np.isfinite(time.values), channel.values, np.nan)
+    reading = attempt(faults, lambda: in_radians(channel, timed, choices, calibration, where))
+    driven = None
+    if reading is not None:
+        driven = attempt(faults, partial(find_input, table.channels, clock, reading, choices, where))
+    if time is None or reading is None or faults:
+        raise Unread(joined(faults), run)
+    remarks = [*run.said, *time.why, *reading.why, *(() if driven is None else driven.why)]
+    if table.native:
+        remarks += _apart(table, channel, driven, choices, where)
+        if driven is not None and (outside := _without_input(reading, driven)).any():
+            remarks.append(f"'{driven.name}' has no sample at {outside.sum()} of {rows}: left out")
+            reading = replace(reading, values=np.where(outside, np.nan, reading.values))
+    return RunColumns(run.run, time, reading, driven, tuple(remarks))
 
 
 def _unused(table: Table, columns: RunColumns, choices: ImportChoices) -> list[str]:
@@ -162,7 +147,7 @@ def _unused(table: Table, columns: RunColumns, choices: ImportChoices) -> list[s
         and resembles(channel.name, channel.unit) is None
         and _span(channel) > 0.0
     ]
-    reading = columns.reading[:_JUDGED]
+    reading = columns.reading.values[:_JUDGED]
     moving = []
     for channel in others[:_MOST_JUDGED]:
         values = channel.values[:_JUDGED]
@@ -195,7 +180,7 @@ def with_readings(tables: Sequence[Table], choices: ImportChoices, where: str) -
         part = list(group)
         if part[0].native:
             block = [c for table in part for c in table.channels if c.name in table.native and not is_time(c)]
-            found = _readings(block, None, choices, [], where)
+            found, _ = _readings(block, NO_CHANNEL, choices, where)
             if not found:
                 _refuse_without_angle(block, where)
             part = [table for table in part if any(c.name in table.native for c in found)]
@@ -204,7 +189,7 @@ def with_readings(tables: Sequence[Table], choices: ImportChoices, where: str) -
 
 
 def _apart(
-    table: Table, reading: Channel, driven: RunInput | None, choices: ImportChoices, where: str
+    table: Table, reading: Channel, driven: RunColumn | None, choices: ImportChoices, where: str
 ) -> list[str]:
     """The columns that cannot be aligned with the reading; refused where one of them may be the input."""
     remarks = []
@@ -220,21 +205,17 @@ def _apart(
     return remarks
 
 
-def _within(reading: Readings, driven: RunInput, said: list[str]) -> Readings:
-    """The reading while the input is recorded, NaN before and after; the samples there are counted."""
+def _without_input(reading: RunColumn, driven: RunColumn) -> NDArray[np.bool_]:
+    """Which readings are before or after the record of the input."""
     known = np.flatnonzero(np.isfinite(driven.values))
-    outside = np.ones(reading.size, dtype=bool)
+    outside = np.isfinite(reading.values)
     if known.size:
         outside[known[0] : known[-1] + 1] = False
-    lost = int(np.count_nonzero(outside & np.isfinite(reading)))
-    if not lost:
-        return reading
-    said.append(f"'{one_line(driven.channel.name, 40)}' has no sample at {lost} of {reading.size}: left out")
-    return np.where(outside, np.nan, reading)
+    return outside
 
 
-def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[ColumnPair]:
-    """The columns of each run, at least one run."""
+def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[RunColumns]:
+    """The columns of each run as in the file, at least one run."""
     starts = [i for i, c in enumerate(table.channels) if matches(c, choices.time or "") or is_time(c)]
     stems = {stem(table.channels[i].name) for i in starts}
     blocks = [table.channels]
@@ -251,7 +232,7 @@ def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[ColumnP
     for block in blocks:
         remarks: list[str] = []
         clocks = [channel for channel in block if is_time(channel)]
-        time = None  # where the samples follow at a stated rate
+        time = NO_CHANNEL  # where the samples follow at a stated rate
         if choices.time is not None:
             time = _chosen(block, choices.time, "--time", where)[0]
         elif clocks:
@@ -275,14 +256,20 @@ def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[ColumnP
                     remarks.append(f"times from '{time.name}': {why}")
                     break
         own_clock = [c for c in block if not table.native or c.name in table.native]
-        readings = _readings(own_clock, time, choices, remarks, where)
+        readings, chosen = _readings(own_clock, time, choices, where)
         for reading in readings:
             mark = RUN_MARK.search(reading.name)
             run = f"run-{mark[1]}" if mark else reading.name if len(readings) > 1 else ""
-            pairs.append(ColumnPair(run, time, reading, tuple(remarks)))
+            pairs.append(_pair(time, reading, run, (*remarks, *chosen)))
     if not pairs:
         _refuse_without_angle(table.channels, where)
     return pairs
+
+
+def _pair(time: Channel, reading: Channel, run: str = "", said: tuple[str, ...] = ()) -> RunColumns:
+    """The columns of a run as in the file."""
+    clock = RunColumn(time, time.values, time.unit, "time")
+    return RunColumns(run, clock, RunColumn(reading, reading.values, reading.unit, "angle"), said=said)
 
 
 def _refuse_without_angle(channels: Sequence[Channel], where: str) -> NoReturn:
@@ -302,11 +289,12 @@ def _chosen(block: Sequence[Channel], wanted: str, option: str, where: str) -> l
 
 
 def _readings(
-    block: Sequence[Channel], time: Channel | None, choices: ImportChoices, said: list[str], where: str
-) -> list[Channel]:
+    block: Sequence[Channel], time: Channel, choices: ImportChoices, where: str
+) -> tuple[list[Channel], list[str]]:
+    """The columns of readings, and remarks on them."""
     if choices.angle:
         chosen = [c for name in choices.angle for c in _chosen(block, name, "--angle", where)]
-        return [channel for channel in chosen if channel is not time]
+        return [channel for channel in chosen if channel is not time], []
     free = [c for c in _unconditional(block, choices) if c is not time]
     driving = stated_input(block, choices)
     others = [c for c in free if not is_input(c) and c is not driving]
@@ -322,10 +310,10 @@ def _readings(
         found = own or _likeliest(others)[1]
     widest = {unit: max(_span(c) for c in found if c.unit == unit) for unit in {c.unit for c in found}}
     still = [c for c in found if _span(c) < _HARDLY * widest[c.unit]]
-    said += [f"'{stem(channel.name)}' is left out: it hardly moves" for channel in still]
+    remarks = [f"'{stem(channel.name)}' is left out: it hardly moves" for channel in still]
     found = [channel for channel in found if channel not in still]
     while len(found) > 1 and (rate := _a_rate(found, time)) is not None:
-        said.append(f"'{stem(rate.name)}' is left out: it is the rate of another column")
+        remarks.append(f"'{stem(rate.name)}' is left out: it is the rate of another column")
         found.remove(rate)
     of_runs = len({stem(c.name) for c in found}) == 1 and all(RUN_MARK.search(c.name) for c in found)
     if len(found) > 1 and not of_runs:
@@ -334,9 +322,9 @@ def _readings(
         several = TunnelError(
             what, where=where, remedy=f"give {option}, or another of them", options=(option,)
         )
-        raise Unread(several, (time, found[0]))
-    said += [f"angle from '{stem(channel.name)}'" for channel in found if len(others) > 1]
-    return found
+        raise Unread(several, _pair(time, found[0]))
+    remarks += [f"angle from '{stem(channel.name)}'" for channel in found if len(others) > 1]
+    return found, remarks
 
 
 def _likeliest(channels: Sequence[Channel]) -> tuple[int, list[Channel]]:
@@ -379,9 +367,9 @@ def _span(channel: Channel) -> float:
     return float(np.ptp(numbers)) if numbers.size else 0.0
 
 
-def _a_rate(channels: Sequence[Channel], time: Channel | None) -> Channel | None:
+def _a_rate(channels: Sequence[Channel], time: Channel) -> Channel | None:
     """A column that follows the derivative of another one; None if there is none."""
-    if time is None:
+    if time is NO_CHANNEL:
         return None
     for angle in channels:
         for rate in channels:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -60,7 +60,7 @@ class Stated:
     hints: tuple[Hint, ...] = ()
     like: tuple[tuple[Channel, Hint], ...] = ()
 
-    def of_rows(self, rows: NDArray[np.bool_] | slice) -> Stated:
+    def of_rows(self, rows: NDArray[np.intp]) -> Stated:
         """The statements in some rows."""
         return replace(
             self,
@@ -68,41 +68,41 @@ class Stated:
             like=tuple((replace(c, values=c.values[rows]), hint) for c, hint in self.like),
         )
 
-    def measured(self, rows: NDArray[np.bool_], said: list[str]) -> dict[str, float]:
-        """Conditions stated by columns in some rows."""
-        found = {
-            key: value
+    def measured(self, rows: NDArray[np.bool_]) -> tuple[dict[str, float], list[str]]:
+        """Conditions stated by columns in some rows, and remarks on them."""
+        stated = {
+            key: (value, remark)
             for key, column in self.columns.items()
-            if (value := from_column(key, column, rows, said)) is not None
+            for value, remark in _from_column(key, column, rows)
         }
-        names = [(key, self.columns[key].name) for key in found]
+        remarks = [remark for _, remark in stated.values() if remark]
+        names = [(key, self.columns[key].name) for key in stated]
         if names:
             listed = ", ".join(
                 key if key == name else f"{key} ('{one_line(name, 40)}')" for key, name in names
             )
-            said.append(f"from columns: {listed}")
-        return found
+            remarks.append(f"from columns: {listed}")
+        return {key: value for key, (value, _) in stated.items()}, remarks
 
     def unused(self, rows: NDArray[np.bool_]) -> list[Hint]:
         """Unused content that resembles a condition in some rows; a column about zero does not."""
         found = [*self.hints]
         for column, hint in self.like:
-            value = from_column(hint.key, replace(column, unit=""), rows, [])
-            if value is not None and np.isfinite(value):
-                found.append(replace(hint, value=value))
+            values = _from_column(hint.key, replace(column, unit=""), rows)
+            found += [replace(hint, value=value) for value, _ in values if np.isfinite(value)]
         return found
 
 
 def find_conditions(
-    table: Table,
-    beside: Sequence[Channel | None],
-    choices: ImportChoices,
-    said: list[str],
-    where: str,
-) -> Stated:
-    """The statements of a table on the conditions of its runs; ``beside``: the columns used otherwise."""
+    table: Table, beside: Sequence[Channel], choices: ImportChoices, where: str
+) -> tuple[Stated, list[str]]:
+    """The statements of a table on the conditions of its runs, and remarks on them.
+
+    Args:
+        beside: the columns used otherwise.
+    """
     claimed = choices.stated_by.model_dump(exclude_none=True)
-    numbers, hints = from_facts(table.facts, claimed, said, where)
+    numbers, hints, remarks = _from_facts(table.facts, claimed, where)
     columns: dict[str, Channel] = {}
     like = []
     for channel in table.channels:
@@ -120,11 +120,11 @@ def find_conditions(
             what = f"no column or number '{one_line(text, 40)}' that states {key}"
             raise TunnelError(what, where=where, remedy=f"--set {key}: {did_you_mean(text, known)}")
     hints += [hint for name, text in table.texts.items() if (hint := _hint_of_text(name, text)) is not None]
-    said += unused_statements(table, claimed)
-    return Stated(numbers, columns, hints=tuple(hints), like=tuple(like))
+    remarks += _unused_statements(table, claimed)
+    return Stated(numbers, columns, hints=tuple(hints), like=tuple(like)), remarks
 
 
-def unused_statements(table: Table, claimed: Mapping[str, str]) -> list[str]:
+def _unused_statements(table: Table, claimed: Mapping[str, str]) -> list[str]:
     """A remark on the numbers and texts of a table that are neither used nor reported otherwise."""
     found = []
     for heading, value in table.facts.items():
@@ -155,16 +155,13 @@ def _hint_of_text(name: str, text: str) -> Hint | None:
     return None
 
 
-def from_facts(
-    facts: Mapping[str, float], claimed: Mapping[str, str], said: list[str], where: str
-) -> tuple[dict[str, float], list[Hint]]:
-    """Conditions and sizes stated by numbers of a file, each reported, and numbers that only resemble one.
+def _from_facts(
+    facts: Mapping[str, float], claimed: Mapping[str, str], where: str
+) -> tuple[dict[str, float], list[Hint], list[str]]:
+    """Conditions and sizes stated by numbers of a file, by key, in the units of `Conditions`; hints; remarks.
 
     Args:
         claimed: by key, the names of numbers that the user has declared to state a condition.
-
-    Returns:
-        Values by key of `Conditions`, in its units, and hints.
     """
     conditions: dict[str, float] = {}
     names: dict[str, str] = {}
@@ -188,10 +185,9 @@ def from_facts(
     if "air_density" in conditions and "wind_speed" not in conditions and len(symbols) == 1:
         conditions["wind_speed"], names["wind_speed"] = symbols[0].value, f"{symbols[0].what}, in m/s"
         hints.remove(symbols[0])
-    for key, value in conditions.items():
-        named = "" if names[key] == key else f" ({names[key]})"
-        said.append(stated_remark(key, value, f"the file{named}"))
-    return conditions, hints
+    named = {key: "" if names[key] == key else f" ({names[key]})" for key in conditions}
+    remarks = [stated_remark(key, value, f"the file{named[key]}") for key, value in conditions.items()]
+    return conditions, hints, [*remarks]
 
 
 def stated_remark(key: str, value: float, place: str) -> ImportRemark:
@@ -234,22 +230,21 @@ def _hint(name: str, unit: str, key: str | None, value: float) -> Hint | None:
     return Hint(key, value, what, why, use, option=option)
 
 
-def from_column(key: str, column: Channel, rows: NDArray[np.bool_], said: list[str]) -> float | None:
-    """The condition of a run stated by a column, in the unit of `Conditions`; None if it does not state one."""
+def _from_column(key: str, column: Channel, rows: NDArray[np.bool_]) -> Iterator[tuple[float, str]]:
+    """The condition of a run stated by a column, in the unit of `Conditions`, and a remark; nothing without one."""
     values = column.values[rows]
     values = values[np.isfinite(values)]
     if not values.size:
-        return None
+        return
     factor = in_si(key, column.unit) or 1.0
     low, middle, high = map(float, np.quantile(values, (0.05, 0.5, 0.95)))
     if high - low <= _EVEN * abs(middle):
-        return middle * factor
+        yield middle * factor, ""
+        return
     off = key == "wind_speed" and low <= 0.0 and middle < _OFF * (high - low)
-    said.append(
-        f"the column '{column.name}' varies from {low:.4g} to {high:.4g}: {key} is "
-        + ("zero, about which it lies" if off else f"its median, {middle * factor:.6g}")
-    )
-    return 0.0 if off else middle * factor
+    where = "zero, about which it lies" if off else f"its median, {middle * factor:.6g}"
+    remark = f"the column '{column.name}' varies from {low:.4g} to {high:.4g}: {key} is {where}"
+    yield 0.0 if off else middle * factor, remark
 
 
 def of_short_table(table: Table) -> list[Hint]:
@@ -274,24 +269,24 @@ def conditions_of(
     rows: NDArray[np.bool_],
     choices: ImportChoices,
     table: ConditionTable | None,
-    said: list[str],
     where: str,
-) -> tuple[dict[str, float], dict[str, float]]:
-    """The conditions of the run in some rows, and the sizes stated beside them, by key."""
+) -> tuple[dict[str, float], dict[str, float], list[str]]:
+    """The conditions of the run in some rows, and the sizes stated beside them, by key; and remarks."""
     given = choices.conditions.model_dump(include=set(RUN_KEYS), exclude_none=True)
     in_table = {} if table is None else table.of(file, run)
     # Precedence: --set, the table, the name of the file, the columns, and other numbers of the file.
-    found = {**stated.numbers, **stated.measured(rows, said), **stated.named, **in_table, **given}
+    measured, remarks = stated.measured(rows)
+    found = {**stated.numbers, **measured, **stated.named, **in_table, **given}
     sizes = {key: found.pop(key) for key in OF_CAMPAIGN if key in found}
     sizes = {} if list(sizes) == ["width"] else sizes  # many things have a width
     validate(Conditions, found | sizes, file)
     plausible_values(found | sizes, where)
-    return found, sizes
+    return found, sizes, remarks
 
 
 def ask_conditions(
     table: Table,
-    beside: Sequence[Channel | None],
+    beside: Sequence[Channel],
     choices: ImportChoices,
     named: Mapping[str, float],
     hints: Sequence[Hint],
@@ -305,10 +300,10 @@ def ask_conditions(
         named: conditions stated by the name of the file, or for it.
         hints: conditions that the name of the file seems to state; the others are as above.
     """
-    stated = find_conditions(table, beside, choices, [], where)
+    stated, _ = find_conditions(table, beside, choices, where)
     rows = np.ones(table.channels[0].values.size, dtype=bool)
     given = choices.conditions.model_dump(exclude_none=True)
-    known = {**stated.numbers, **stated.measured(rows, []), **named, **given}
+    known = {**stated.numbers, **stated.measured(rows)[0], **named, **given}
     open_conditions(known, known, [*stated.unused(rows), *hints], "", where, driven=True, later=later)
 
 

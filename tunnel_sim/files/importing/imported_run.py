@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
+from typing import cast
 
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.cleaning import clipped, clock_text, from_rest, from_zero
-from tunnel_sim.files.importing.condition_names import Hint
-from tunnel_sim.files.importing.condition_table import ConditionTable
 from tunnel_sim.files.importing.conditions import conditions_of, open_conditions
+from tunnel_sim.files.importing.import_statements import ImportStatements
 from tunnel_sim.files.importing.raw_records import RawRecord
 from tunnel_sim.files.importing.releases import RecordPiece, stated_piece
 from tunnel_sim.files.importing.remarks import ImportRemark, doubt, doubt_of_motion
@@ -19,7 +19,7 @@ from tunnel_sim.files.reading import stem_of
 from tunnel_sim.files.toml_input import one_line, shown
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError, counted
-from tunnel_sim.vocabulary.input_kinds import INPUTS
+from tunnel_sim.vocabulary.input_kinds import INPUTS, InputColumn
 from tunnel_sim.vocabulary.inputs import HOLDS, Hold, Input, without_spring_needs_input
 from tunnel_sim.vocabulary.quantities import Readings, Times
 from tunnel_sim.vocabulary.record import Record
@@ -58,22 +58,17 @@ def imported_run(
     name: str,
     raw: RawRecord,
     piece: RecordPiece,
-    choices: ImportChoices,
-    table: ConditionTable | None,
-    named: Sequence[Hint],
-    *,
-    later: bool,
+    beside: ImportStatements,
 ) -> ImportedRun:
     """A run of a record.
 
     Args:
         piece: the part of the record that is the run.
-        named: conditions that the name of its file seems to state.
-        later: whether a missing air density may be stated later (`ImportedRun.held`).
 
     Raises:
         Unstated: where a condition is open that only the user can state.
     """
+    choices = beside.choices
     where = shown(raw.source) + ("" if name == one_line(stem_of(raw.source)) else f", run '{name}'")
     stretch = choices.stretch_of(raw.source.name, name)
     piece = stated_piece(raw.cleaned.file_time_s, piece, stretch, where)
@@ -88,19 +83,21 @@ def imported_run(
     remarks = _on_the_cut(name, raw, piece, clock, reading, sensor.unit)
     rest = choices.rest if stretch.rest is None else stretch.rest
     if rest is not None:
-        reading = from_rest(reading, rest, sensor.unit, remarks, where)
+        reading, remark = from_rest(reading, rest, sensor.unit, where)
+        remarks.append(remark)
     rows = raw.rows(float(time[0]), float(time[-1]))
-    stated, sizes = conditions_of(raw.stated, raw.source, name, rows, choices, table, remarks, where)
-    hints = [*raw.stated.unused(rows), *named]
+    stated, sizes, said = conditions_of(raw.stated, raw.source, name, rows, choices, beside.table, where)
+    hints = [*raw.stated.unused(rows), *beside.hints[raw.source]]
     named_by = f"{stem_of(raw.source)} {name}"
     driven, common = raw.input is not None, choices.conditions.model_dump()
-    asked, windy = open_conditions(stated, common, hints, named_by, where, driven=driven, later=later)
-    remarks += asked
+    asked, windy = open_conditions(stated, common, hints, named_by, where, driven=driven, later=beside.later)
+    remarks += [*said, *asked]
     held: dict[str, float] = {}
     if windy:
         held = {key: stated.pop(key) for key in ("spring_stiffness",) if key in stated}
         remarks.append(doubt(f"air_density is not stated (wind-on, {stated['wind_speed']:g} m/s)"))
-    drive = _drive(raw, kept, choices, remarks)
+    drive, said = _drive(raw, kept, choices)
+    remarks += said
     without_spring_needs_input((stated | held).get("spring_stiffness"), drive, where)
     time = from_zero(time)
     try:
@@ -162,11 +159,12 @@ def _left_out(error: TunnelError) -> str:
     return f"left out: {error.what}{kept}"
 
 
-def _drive(raw: RawRecord, kept: slice, choices: ImportChoices, said: list[str]) -> Input | None:
-    """The input of a run; None for a free decay."""
+def _drive(raw: RawRecord, kept: slice, choices: ImportChoices) -> tuple[Input | None, list[str]]:
+    """The input of a run, and remarks; None for a free decay."""
     if raw.input is None:
-        return None
-    column, values = raw.input
+        return None, []
+    column = cast(InputColumn, raw.input.role)
+    said: list[str] = []
     order, gain = raw.input_facts.get("drive_hold"), raw.input_facts.get("drive_gain") or None
     hold: Hold | None = choices.input_hold or (HOLDS[int(order)] if order in (0.0, 1.0) else None)
     gain = gain if "drive_gain" in INPUTS[column].keys else None
@@ -177,4 +175,4 @@ def _drive(raw: RawRecord, kept: slice, choices: ImportChoices, said: list[str])
         said.append(found if order in (0.0, 1.0) else doubt(f"drive_hold: {asked}"))
     said += [] if gain is None else [f"drive_gain = {gain:g} from the file"]
     said += [] if kv is None else [f"servo_kv = {kv:g} from the file"]
-    return Input(column, values[kept], hold, gain, kv)
+    return Input(column, raw.input.values[kept], hold, gain, kv), said

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,27 +12,12 @@ from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.column_names import ANGLE, named
 from tunnel_sim.files.importing.condition_names import condition_of
 from tunnel_sim.files.importing.remarks import doubt
-from tunnel_sim.files.importing.tables import Channel, is_input
+from tunnel_sim.files.importing.tables import Channel, RunColumn, is_input
 from tunnel_sim.vocabulary.errors import TunnelError, counted, did_you_mean, one_line
 from tunnel_sim.vocabulary.input_kinds import INPUTS, KINDS, Command, InputColumn
 from tunnel_sim.vocabulary.inputs import Input, checked_input
 from tunnel_sim.vocabulary.quantities import PerSample, Rows, Share
 from tunnel_sim.vocabulary.record import Record
-
-
-@dataclass(frozen=True, eq=False)
-class RunInput:
-    """The input of a run.
-
-    Args:
-        channel: its column.
-        values: in the unit of ``column``.
-    """
-
-    column: InputColumn
-    channel: Channel
-    values: Rows
-
 
 _NAMES = re.compile(
     r"(?<![a-z])(torque|moment|drehmoment|drive|input|excitation|anregung|command|cmd|control|motor|shaker|actuator|"
@@ -67,27 +51,21 @@ def names_input(channel: Channel) -> bool:
 
 
 def find_input(
-    channels: Sequence[Channel],
-    beside: Sequence[Channel | None],
-    reading: Rows,
-    choices: ImportChoices,
-    remarks: list[str],
-    where: str,
-    unit: str = "rad",
-) -> RunInput | None:
-    """The input of a run; None for a free decay.
+    channels: Sequence[Channel], clock: Channel, reading: RunColumn, choices: ImportChoices, where: str
+) -> RunColumn | None:
+    """The input of a run, in the unit of its kind, which is its role; None for a free decay.
 
     Args:
-        beside: the columns of times and reading.
-        unit: of the reading, for angles without one.
+        clock: the column of the times.
     """
     if choices.input == "none":
         return None
-    others = [channel for channel in channels if all(channel is not one for one in beside)]
+    others = [channel for channel in channels if channel is not clock and channel is not reading.channel]
+    values = reading.values
     if choices.input is not None:
         stated = stated_input(channels, choices)
         if stated is not None and all(stated is not one for one in others):
-            use = "times are" if stated is beside[0] else "angle is"
+            use = "times are" if stated is clock else "angle is"
             column = f"'{one_line(choices.input, 40)}' is the column '{one_line(stated.name, 40)}'"
             what = f"{column}, from which the {use} read"
             remedy = (
@@ -98,24 +76,25 @@ def find_input(
             what = f"no column '{one_line(choices.input, 40)}' for the input"
             remedy = f"--input: {did_you_mean(choices.input, {c.name for c in others})}"
             raise TunnelError(what, where=where, remedy=remedy)
-        return _as_input(stated, reading, choices, remarks, unit, where)
+        return _as_input(stated, reading, choices, where)
     # a column that is empty here is the input of other runs of the file
     exact = [channel for channel in others if is_input(channel) and np.isfinite(channel.values).any()]
     candidates = [*exact]
     for channel in () if exact else others:
-        good = np.isfinite(channel.values) & np.isfinite(reading)
+        good = np.isfinite(channel.values) & np.isfinite(values)
         if not names_input(channel) or np.count_nonzero(good) < 16:
             continue
-        record = Record(np.arange(np.count_nonzero(good), dtype=np.float64), reading[good])
+        record = Record(np.arange(np.count_nonzero(good), dtype=np.float64), values[good])
         with suppress(TunnelError):  # it is not the motion itself
             checked_input(Input("drive", channel.values[good]), record, "", judged=False)
             # The command of an angle by its name moves the body, however little of the motion it explains.
             certain = names_command(channel) and ANGLE.search(channel.name)
-            if certain or chance_without_effect(channel.values[good], reading[good]) < _FALSE_ALARM:
+            if certain or chance_without_effect(channel.values[good], values[good]) < _FALSE_ALARM:
                 candidates.append(channel)
     commands = [channel for channel in candidates if names_command(channel)]
+    beside: list[str] = []
     if len(commands) == 1 and not exact:
-        remarks += [
+        beside = [
             doubt(
                 f"'{one_line(c.name, 40)}' moves before or with the angle and is not used; --input uses it "
                 f"instead of '{one_line(commands[0].name, 40)}'"
@@ -130,12 +109,18 @@ def find_input(
         remedy = f"give {option}, another of them, or --input none"
         what = f"{len(candidates)} columns may be the input: {listed}"
         raise TunnelError(what, where=where, remedy=remedy, options=(option,))
-    return _as_input(candidates[0], reading, choices, remarks, unit, where) if candidates else None
+    return _as_input(candidates[0], reading, choices, where, beside) if candidates else None
 
 
 def _as_input(
-    channel: Channel, reading: Rows, choices: ImportChoices, said: list[str], unit: str, where: str
-) -> RunInput:
+    channel: Channel, reading: RunColumn, choices: ImportChoices, where: str, beside: Sequence[str] = ()
+) -> RunColumn:
+    """A column as an input.
+
+    Args:
+        beside: remarks on other columns.
+    """
+    remarks = [*beside]
     column = choices.input_as or _claimed(channel) or "drive"
     kind = INPUTS[column]
     factor, name = kind.factor(channel.unit), one_line(channel.name, 40)
@@ -146,13 +131,14 @@ def _as_input(
                 f"give the unit in its name, such as {name}_deg; or --input-as drive, whose gain is fitted"
             )
             raise TunnelError(what, where=where, remedy=remedy)
-        factor = kind.factor(unit) / (choices.counts_per_turn or 1.0)
-        said += [f"'{name}' is taken in the unit of the angle, {unit}"] if choices.input_as is None else []
-    size, lag = correlation(channel.values, reading)
+        factor = kind.factor(reading.unit) / (choices.counts_per_turn or 1.0)
+        if choices.input_as is None:
+            remarks.append(f"'{name}' is taken in the unit of the angle, {reading.unit}")
+    size, lag = correlation(channel.values, reading.values)
     driven, free = f"driven by '{name}', {kind.meaning} ({column})", "--input none if it is a free decay"
     correlated = f"its correlation with the reading is {size:.2f} at a lag of {counted(lag, 'sample')}"
-    said.append(doubt(f"{driven}: {correlated}; {free}", f"{driven}; {free}"))
-    return RunInput(column, channel, channel.values * factor)
+    remarks.append(doubt(f"{driven}: {correlated}; {free}", f"{driven}; {free}"))
+    return RunColumn(channel, channel.values * factor, channel.unit, column, tuple(remarks))
 
 
 def _claimed(channel: Channel) -> InputColumn | None:

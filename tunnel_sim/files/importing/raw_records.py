@@ -5,20 +5,17 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.cleaning import Cleaned, cleaned, restarts
-from tunnel_sim.files.importing.column_numbers import Calibration
 from tunnel_sim.files.importing.columns import RunColumns, Unread, find_columns, with_readings
-from tunnel_sim.files.importing.condition_names import Hint
-from tunnel_sim.files.importing.condition_table import ConditionTable
 from tunnel_sim.files.importing.conditions import (
     Stated,
     ask_conditions,
@@ -26,13 +23,13 @@ from tunnel_sim.files.importing.conditions import (
     of_short_table,
     stated_remark,
 )
+from tunnel_sim.files.importing.import_statements import ImportStatements
 from tunnel_sim.files.importing.source import Source
-from tunnel_sim.files.importing.tables import INPUT_FACTS, LEAST_ROWS, Table
+from tunnel_sim.files.importing.tables import INPUT_FACTS, LEAST_ROWS, NO_CHANNEL, RunColumn, Table
 from tunnel_sim.files.importing.units import UNITS, kind_of, names_a_time
 from tunnel_sim.files.reading import stem_of
 from tunnel_sim.vocabulary.campaign import Quantity
 from tunnel_sim.vocabulary.errors import TunnelError, attempt, counted, joined, one_line, shown
-from tunnel_sim.vocabulary.input_kinds import InputColumn
 from tunnel_sim.vocabulary.quantities import PerSample, Rows, Seconds
 from tunnel_sim.vocabulary.turning_points import HoldsTurningPoints, TurningPoints, are_turning_points
 
@@ -48,120 +45,94 @@ class RawRecord:
     """A record of a file, cleaned but not yet cut.
 
     Args:
+        reading: its column.
         stated: the conditions stated in the file, in numbers and in the rows of the record.
         clock: of these rows, from the first sample on, s; NaN where there is no time.
         whole: whether the file itself states that it is one run.
-        input: of a driven record: its kind, and its values at the cleaned times; None for free decays.
+        input: of a driven record, at the cleaned times; None for free decays.
         input_facts: the order of its hold (0 or 1) and its gain in N m per unit, by key of the format.
     """
 
     id: str
     source: Path
-    column: str
+    reading: RunColumn
     cleaned: Cleaned
-    quantity: Quantity
-    unit: str
     stated: Stated
     said: tuple[str, ...]
     clock: Rows
     whole: bool
-    input: tuple[InputColumn, PerSample] | None = None
+    input: RunColumn | None = None
     input_facts: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def quantity(self) -> Quantity:
+        """The quantity of the reading."""
+        return cast(Quantity, self.reading.role)
 
     def rows(self, first: Seconds, last: Seconds) -> NDArray[np.bool_]:
         """Which rows of the record belong to a run from its first to its last sample."""
         return (self.clock >= first) & (self.clock <= last)
 
 
-def raw_records(
-    source: Source,
-    choices: ImportChoices,
-    calibration: Calibration | None,
-    named: dict[str, float],
-    hints: Sequence[Hint],
-    *,
-    several: bool,
-    conditions: ConditionTable | None = None,
-    later: bool = False,
-) -> list[RawRecord]:
-    """The records of a file, with the conditions in its name.
-
-    Args:
-        several: whether ids must name the file among others.
-        conditions: a table of conditions; None: there is none.
-        hints: conditions that the name of the file seems to state.
-        later: whether missing air densities may be stated later.
-    """
+def raw_records(source: Source, beside: ImportStatements) -> list[RawRecord]:
+    """The records of a file, with the conditions stated in it and in its name."""
+    choices, path, named = beside.choices, source.path, beside.named(source.path)
     # A short table beside longer ones contains conditions or sizes.
     long = [table for table in source.tables if table.channels[0].values.size >= LEAST_ROWS]
     short = [hint for table in source.tables if long and table not in long for hint in of_short_table(table)]
     found = []
-    for table in with_readings(long or source.tables, choices, shown(source.path)):
-        where = shown(source.path) + (f", {one_line(table.part)}" if table.part else "")
+    for table in with_readings(long or source.tables, choices, shown(path)):
+        where = shown(path) + (f", {one_line(table.part)}" if table.part else "")
         try:
-            every = find_columns(table, choices, calibration, where)
+            runs = find_columns(table, choices, beside.calibration, where)
         except Unread as fault:
             faults: list[TunnelError] = [fault]  # what is to be stated of a file is asked for at once
-            with suppress(TunnelError):  # the table may name runs that are not known yet
-                stated_of = {} if conditions is None else conditions.of(source.path, stem_of(source.path))
-                used, known = fault.columns, named | stated_of
-                attempt(
-                    faults,
-                    partial(ask_conditions, table, used, choices, known, hints, where, later=later),
-                )
+            known, hints, used = beside.of_file(path), beside.hints[path], fault.columns.used
+            asked = partial(ask_conditions, table, used, choices, known, hints, where, later=beside.later)
+            attempt(faults, asked)
             raise joined(faults) from None
-        for columns in every:
-            said = [*columns.said]
-            kept = _from_start_to_end(columns.time, choices, said)
-            stated = find_conditions(table, columns.used, choices, said, where).of_rows(kept)
+        for columns in runs:
+            stated, remarks = find_conditions(table, columns.used, choices, where)
             stated = replace(stated, named=named, hints=(*stated.hints, *short))
-            run = columns.pair.run
-            file = stem_of(source.path) if several or not (table.part or run) else ""
-            name = one_line("-".join(part for part in (file, table.part, run) if part))
-            said += [stated_remark(key, value, "the file's name") for key, value in named.items()]
-            run_rows = _RunRows(name, source.path, table, columns, kept, stated, said, where)
-            found += _records(run_rows, choices)
+            file = stem_of(path) if beside.several or not (table.part or columns.run) else ""
+            name = one_line("-".join(part for part in (file, table.part, columns.run) if part))
+            remarks += [stated_remark(key, value, "the file's name") for key, value in named.items()]
+            found += _records(name, path, table, columns, stated, remarks, choices, where)
     return found
 
 
-def _from_start_to_end(time: Rows, choices: ImportChoices, said: list[str]) -> NDArray[np.bool_]:
-    """Which rows of a table are used."""
+def _from_start_to_end(time: Rows, choices: ImportChoices) -> tuple[NDArray[np.bool_], list[str]]:
+    """Which rows of a table are used, and a remark."""
     if choices.start is None and choices.end is None:
-        return np.ones(time.shape, dtype=bool)
+        return np.ones(time.shape, dtype=bool), []
     first = -np.inf if choices.start is None else choices.start
     last = np.inf if choices.end is None else choices.end
     # Stamps are decimals: a start at one of them includes it.
     slack = 1e-9 * max(abs(end) for end in (choices.start, choices.end) if end is not None)
     kept: NDArray[np.bool_] = (time >= first - slack) & (time <= last + slack)
-    said.append(f"{int(kept.sum())} of {counted(time.size, 'sample')} from --start to --end")
-    return kept
+    return kept, [f"{int(kept.sum())} of {counted(time.size, 'sample')} from --start to --end"]
 
 
-@dataclass(frozen=True, eq=False)
-class _RunRows:
-    """The rows of a run in a table.
+def _records(
+    name: str,
+    path: Path,
+    table: Table,
+    columns: RunColumns,
+    stated: Stated,
+    said: Sequence[str],
+    choices: ImportChoices,
+    where: str,
+) -> list[RawRecord]:
+    """The cleaned records of the columns of a run: one, or one from each start of the clock.
 
     Args:
-        kept: which rows of the table are used.
-        where: file and table, for errors.
+        said: remarks on its conditions.
     """
-
-    name: str
-    path: Path
-    table: Table
-    columns: RunColumns
-    kept: NDArray[np.bool_]
-    stated: Stated
-    said: Sequence[str]
-    where: str
-
-
-def _records(run: _RunRows, choices: ImportChoices) -> list[RawRecord]:
-    """The cleaned records of the columns of a run: one, or one from each start of the clock."""
     records = []
-    table, columns, where, remarks = run.table, run.columns, run.where, [*run.said]
+    kept, remarks = _from_start_to_end(columns.time.values, choices)
+    remarks = [*columns.said, *remarks, *said]
     driven = columns.input
-    time, readings = columns.time[run.kept], columns.reading[run.kept]
+    time, readings = columns.time.values[kept], columns.reading.values[kept]
     facts = {key: value for key in INPUT_FACTS if np.isfinite(value := table.facts.get(key, np.nan))}
     starts = [0, *restarts(time), time.size]
     if len(starts) > 2:
@@ -171,31 +142,30 @@ def _records(run: _RunRows, choices: ImportChoices) -> list[RawRecord]:
             clean = cleaned(time[a:b], readings[a:b])
         except TunnelError as error:
             raise TunnelError(error.what, where=where, remedy=error.remedy) from None
-        rows = np.flatnonzero(run.kept)[a:b]
-        if columns.quantity == "angle" and driven is None and are_turning_points(clean.time_s, clean.reading):
-            raise HoldsTurningPoints(_turning_points(run, rows, clean, remarks, choices), where)
+        rows = np.flatnonzero(kept)[a:b]
+        angles = columns.reading.role == "angle" and driven is None
+        if angles and are_turning_points(clean.time_s, clean.reading):
+            told = [*table.said, *remarks]
+            raise HoldsTurningPoints(_turning_points(name, table, columns, rows, clean, told, choices), where)
         if clean.time_s.size < 2:
             raise TunnelError("fewer than two samples", where=where, remedy="leave it out")
         given = None
         if driven is not None:
-            values = driven.values[rows[clean.rows]]
-            missing = int(np.count_nonzero(~np.isfinite(values)))
+            given = replace(driven, values=driven.values[rows[clean.rows]])
+            missing = int(np.count_nonzero(~np.isfinite(given.values)))
             if missing:
                 raise TunnelError(
-                    f"the input {driven.column} has no number at {missing} of {values.size} samples",
+                    f"the input {driven.role} has no number at {missing} of {given.values.size} samples",
                     where=where,
                     remedy="give one value for each sample of the reading, on the same clock, or --input none",
                 )
-            given = driven.column, values
         records.append(
             RawRecord(
-                id=run.name if len(starts) == 2 else f"{run.name}-{place}",
-                source=run.path,
-                column=columns.pair.reading.name,
+                id=name if len(starts) == 2 else f"{name}-{place}",
+                source=path,
+                reading=columns.reading,
                 cleaned=clean,
-                quantity=columns.quantity,
-                unit=columns.unit,
-                stated=run.stated.of_rows(slice(a, b)),
+                stated=stated.of_rows(rows),
                 said=(*remarks, *clean.said),
                 clock=time[a:b] - np.nanmin(np.where(np.isfinite(readings[a:b]), time[a:b], np.nan)),
                 whole=table.named and len(starts) == 2,
@@ -207,20 +177,26 @@ def _records(run: _RunRows, choices: ImportChoices) -> list[RawRecord]:
 
 
 def _turning_points(
-    run: _RunRows, rows: NDArray[np.intp], clean: Cleaned, remarks: Sequence[str], choices: ImportChoices
+    name: str,
+    table: Table,
+    columns: RunColumns,
+    rows: NDArray[np.intp],
+    clean: Cleaned,
+    remarks: Sequence[str],
+    choices: ImportChoices,
 ) -> TurningPoints:
     """The turning points in some rows of a table, with the standard deviations in its columns."""
-    pair, unit = run.columns.pair, run.columns.unit  # the unit also of uncertainties without a known one
-    time, remarks = clean.time_s, [*run.table.said, *remarks]
-    if pair.time is not None and not pair.time.unit and choices.time_unit is None:
+    unit = columns.reading.unit  # also of uncertainties without a known one
+    time, clock = clean.time_s, columns.time.channel
+    if clock is not NO_CHANNEL and not clock.unit and choices.time_unit is None:
         # The step of a clock is short, and half a period of a swing is not.
-        size = float(np.median(np.diff(np.sort(pair.time.values[rows]))))
+        size = float(np.median(np.diff(np.sort(clock.values[rows]))))
         own = "s" if size < _LONGEST_SWING else "ms"
         time = time * size * UNITS["time"][own] / float(np.median(np.diff(time)))
         remarks = [line for line in remarks if "no unit of the times" not in line]
         remarks.append(f"the file states no unit of the times: half periods of {size:.4g} are taken as {own}")
     found: dict[str, PerSample] = {}
-    for channel in run.table.channels:
+    for channel in table.channels:
         mark = _STD.match(channel.name)
         values = channel.values[rows]
         if mark is None or values.shape != time.shape or not (values > 0.0).all():
@@ -229,4 +205,4 @@ def _turning_points(
         if kind in ("time", "angle"):
             factor = UNITS[kind].get(channel.unit) or (1.0 if kind == "time" else UNITS[kind].get(unit, 1.0))
             found.setdefault(kind, values * factor)
-    return TurningPoints(run.name, time, clean.reading, found.get("time"), found.get("angle"), tuple(remarks))
+    return TurningPoints(name, time, clean.reading, found.get("time"), found.get("angle"), tuple(remarks))

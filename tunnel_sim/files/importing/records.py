@@ -4,23 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.cleaning import resolution
 from tunnel_sim.files.importing.column_names import stem
-from tunnel_sim.files.importing.column_numbers import read_calibration
 from tunnel_sim.files.importing.condition_names import (
     OF_CAMPAIGN,
     OF_REPEATABILITY,
     RIG_KEYS,
     SPREAD_KEYS,
-    Hint,
 )
 from tunnel_sim.files.importing.condition_table import ConditionTable
 from tunnel_sim.files.importing.conditions import Unstated
-from tunnel_sim.files.importing.file_names import from_name, name_hints, name_pattern
+from tunnel_sim.files.importing.import_statements import ImportStatements
 from tunnel_sim.files.importing.imported_run import ImportedRun, imported_run
 from tunnel_sim.files.importing.raw_records import RawRecord, raw_records
 from tunnel_sim.files.importing.releases import RecordPiece, find_runs, find_runs_of_rate, with_added
@@ -37,7 +36,7 @@ from tunnel_sim.vocabulary.campaign import (
     RigProperties,
     SensorProperties,
 )
-from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, together
+from tunnel_sim.vocabulary.errors import TunnelError, attempt, did_you_mean, together
 from tunnel_sim.vocabulary.record import Array
 
 _FINDERS: Mapping[Quantity, Callable[[Array, Array], list[RecordPiece]]] = {
@@ -117,12 +116,19 @@ def read_records(
         name: of the campaign; empty: the name of the first file.
         later: whether missing air densities may be stated later (`Imported.held`).
     """
-    table = None if conditions is None else ConditionTable(conditions)
     kept = [path for path in files if path.name not in choices.leave_out]
-    hints = name_hints(kept) if kept else {}
+    beside = ImportStatements.of(kept, choices, conditions, several=len(files) > 1, later=later)
     faults: list[TunnelError] = []  # what is to be stated of all files and runs is asked for at once
-    sources, raws = _raws(kept, choices, hints, table, faults, several=len(files) > 1, later=later)
-    parts = _parts(raws, choices, table, hints, faults, later=later)
+    sources: list[Source] = []
+    raws: list[RawRecord] = []
+    for path in kept:
+        try:
+            source = read_source(path, choices)
+            raws += raw_records(source, beside)
+            sources.append(source)
+        except TunnelError as fault:
+            faults.append(fault)
+    parts = _parts(raws, beside, faults)
     if faults:
         raise _refusal(faults)
     if not raws:
@@ -143,14 +149,15 @@ def read_records(
     check_count(count, limits.CAMPAIGN_SAMPLES, "samples in all files", "", "import fewer files at a time")
     sizes = _sizes(parts, choices)
     campaign = _campaign(parts, sizes, name or one_line(stem_of(files[0])), raws[0].quantity)
-    resolved, said = _resolved(choices, sources, raws), _said(campaign, table)
+    resolved, said = _resolved(choices, sources, raws), _said(campaign, beside.table)
     return Imported(campaign, tuple(parts), tuple(sources), resolved, tuple(said), sizes)
 
 
 def _resolved(choices: ImportChoices, sources: Sequence[Source], raws: Sequence[RawRecord]) -> ImportChoices:
     """The choices with the properties that all records share, for the recipe."""
     known: dict[str, Any] = {**sources[0].known}
-    units, columns = {raw.unit for raw in raws}, tuple(dict.fromkeys(stem(raw.column) for raw in raws))
+    units = {raw.reading.unit for raw in raws}
+    columns = tuple(dict.fromkeys(stem(raw.reading.channel.name) for raw in raws))
     if len(units) == 1 and choices.counts_per_turn is None and choices.calibration is None:
         known["unit"] = units.pop()
     if len(columns) == 1:
@@ -175,62 +182,21 @@ def _said(campaign: Campaign, table: ConditionTable | None) -> list[str]:
     return said
 
 
-def _raws(
-    files: Sequence[Path],
-    choices: ImportChoices,
-    hints: Mapping[Path, Sequence[Hint]],
-    table: ConditionTable | None,
-    faults: list[TunnelError],
-    *,
-    several: bool,
-    later: bool,
-) -> tuple[list[Source], list[RawRecord]]:
-    """The files that can be read, and their records; the refusals of others are added to the faults."""
-    calibration = read_calibration(choices.calibration)
-    pattern = None if choices.name is None else name_pattern(choices.name)
-    sources: list[Source] = []
-    raws: list[RawRecord] = []
-    for path in files:
-        try:
-            source, named = read_source(path, choices), from_name(pattern, path)
-            raws += raw_records(
-                source,
-                choices,
-                calibration,
-                named,
-                hints[path],
-                several=several,
-                conditions=table,
-                later=later,
-            )
-            sources.append(source)
-        except TunnelError as fault:
-            faults.append(fault)
-    return sources, raws
-
-
 def _parts(
-    raws: Sequence[RawRecord],
-    choices: ImportChoices,
-    table: ConditionTable | None,
-    hints: Mapping[Path, Sequence[Hint]],
-    faults: list[TunnelError],
-    *,
-    later: bool,
+    raws: Sequence[RawRecord], beside: ImportStatements, faults: list[TunnelError]
 ) -> list[ImportedRun]:
     """The runs of all records, cut at releases; the refusals of others are added to the faults."""
     ids = [raw.id for raw in raws]
     parts = []
     for at, raw in enumerate(raws):
         label = raw.id if ids.count(raw.id) == 1 else f"{raw.id}-{ids[: at + 1].count(raw.id)}"
-        pieces = _pieces(raw, choices)
+        pieces = _pieces(raw, beside.choices)
         found = dict(zip(_names(label, pieces), pieces, strict=True))
-        added = [one for one in choices.stretches if (one.file, one.record) == (raw.source.name, raw.id)]
+        stated = beside.choices.stretches
+        added = [one for one in stated if (one.file, one.record) == (raw.source.name, raw.id)]
         for run, piece in with_added(raw.cleaned.time_s, found, added).items():
-            try:
-                parts.append(imported_run(run, raw, piece, choices, table, hints[raw.source], later=later))
-            except TunnelError as fault:
-                faults.append(fault)
+            part = attempt(faults, partial(imported_run, run, raw, piece, beside))
+            parts += [] if part is None else [part]
     return parts
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.errors import one_line
 from tunnel_sim.vocabulary.input_kinds import INPUT_COLUMNS
 from tunnel_sim.vocabulary.inputs import HOLDS, INPUT_KEYS
 from tunnel_sim.vocabulary.quantities import Rows
@@ -53,6 +54,33 @@ class Channel:
         """
         object.__setattr__(self, "name", self.name[: limits.NAME_CHARACTERS])
         object.__setattr__(self, "values", np.where(np.isnan(self.values), np.nan, self.values))
+
+
+@dataclass(frozen=True, eq=False)
+class RunColumn:
+    """A column in its role in a run.
+
+    Args:
+        channel: as in the file; `NO_CHANNEL` where the file has no such column.
+        values: in the SI unit of the role, or in the unit of the file before that is known.
+        unit: of the channel, stated or assumed.
+        role: ``time``, the quantity of a reading, or the kind of an input.
+        why: remarks on its choice and its numbers.
+    """
+
+    channel: Channel
+    values: Rows
+    unit: str
+    role: str
+    why: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Its name in a message."""
+        return one_line(self.channel.name, 40)
+
+
+NO_CHANNEL = Channel("", np.empty(0))
 
 
 @dataclass(frozen=True, eq=False)

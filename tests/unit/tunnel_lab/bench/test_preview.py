@@ -15,6 +15,7 @@ from tunnel_lab.bench.records import write
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.files.importing.choices import ImportChoices, read_recipe
+from tunnel_sim.files.importing.import_statements import ImportStatements
 from tunnel_sim.files.importing.imported_run import imported_run
 from tunnel_sim.files.importing.records import read_records
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -209,7 +210,8 @@ def test_a_second_release_in_a_run_that_a_file_names_is_to_be_judged(session: Se
     imported = preview.read(session)[0]
     (part,) = imported.parts
     piece = replace(part.piece, again=1000)
-    named = imported_run("log", part.raw, piece, ImportChoices(), None, (), later=True)
+    beside = ImportStatements.of([part.raw.source], ImportChoices(), None, several=False, later=True)
+    named = imported_run("log", part.raw, piece, beside)
     (said,) = preview.doubts_of(named)
     assert said == "a second release at 5 s, though the file names one run"
     assert f"{said}; --end log=5 ends it there" in named.said  # the import's sentence, with its option

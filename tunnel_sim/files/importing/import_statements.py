@@ -1,0 +1,64 @@
+"""What an import knows beside the content of a file: choices, a calibration, a table of conditions, and names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.column_numbers import Calibration, read_calibration
+from tunnel_sim.files.importing.condition_names import Hint
+from tunnel_sim.files.importing.condition_table import ConditionTable
+from tunnel_sim.files.importing.file_names import from_name, name_hints, name_pattern
+from tunnel_sim.files.reading import stem_of
+from tunnel_sim.vocabulary.errors import TunnelError
+
+
+@dataclass(frozen=True, eq=False)
+class ImportStatements:
+    """What is known beside the content of the files.
+
+    Args:
+        table: of conditions; None: there is none.
+        hints: by file, conditions that its name seems to state.
+        several: whether the names of runs must name their file among others.
+        later: whether missing air densities may be stated later.
+    """
+
+    choices: ImportChoices
+    calibration: Calibration | None
+    table: ConditionTable | None
+    pattern: re.Pattern[str] | None
+    hints: Mapping[Path, Sequence[Hint]]
+    several: bool
+    later: bool
+
+    @classmethod
+    def of(
+        cls, files: Sequence[Path], choices: ImportChoices, table: Path | None, *, several: bool, later: bool
+    ) -> ImportStatements:
+        """The statements on some files."""
+        return cls(
+            choices,
+            read_calibration(choices.calibration),
+            None if table is None else ConditionTable(table),
+            None if choices.name is None else name_pattern(choices.name),
+            name_hints(files) if files else {},
+            several,
+            later,
+        )
+
+    def named(self, file: Path) -> dict[str, float]:
+        """Conditions in the name of a file, which must match the pattern where there is one."""
+        return from_name(self.pattern, file)
+
+    def of_file(self, file: Path) -> dict[str, float]:
+        """Conditions stated of a whole file, by its name or the table, which may name runs instead."""
+        found = self.named(file)
+        if self.table is not None:
+            with suppress(TunnelError):
+                found |= self.table.of(file, stem_of(file))
+        return found
