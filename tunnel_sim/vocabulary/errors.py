@@ -51,6 +51,11 @@ class TunnelError(Exception):
         super().__init__(f"{text}; {self.remedy}" if self.remedy else text)
 
 
+def asking(option: str, what: str, where: str, more: str = "") -> TunnelError:
+    """A refusal that an option of ``tunnel import`` settles; ``more``: words after it in the remedy."""
+    return TunnelError(what, where=where, remedy=f"give {option}{more}", options=(option,))
+
+
 def attempt(faults: list[TunnelError], make: Callable[[], _T]) -> _T | None:
     """The result of a function; None where it refuses, and the refusal is then added to the others."""
     try:

@@ -17,7 +17,7 @@ from tunnel_sim.files.importing.tables import NO_CHANNEL, Channel, RunColumn
 from tunnel_sim.files.importing.units import UNITS, kind_of, known_unit, written_unit
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import Quantity
-from tunnel_sim.vocabulary.errors import TunnelError, counted, one_line, shown
+from tunnel_sim.vocabulary.errors import TunnelError, asking, counted, one_line, shown
 from tunnel_sim.vocabulary.quantities import PerSample, Rows
 
 _COUNTERS = (2.0**8, 2.0**10, 2.0**12, 2.0**14, 2.0**16, 2.0**24, 2.0**32)
@@ -126,15 +126,13 @@ def in_seconds(
     if times is NO_CHANNEL:
         interval, origin = sample_interval(facts, choices)
         if interval is None:
-            option = "--time NAME"
-            remedy = f"give {option}, or --rate in Hz"
-            raise TunnelError("no column of times", where=where, remedy=remedy, options=(option,))
+            raise asking("--time NAME", "no column of times", where, ", or --rate in Hz")
         why = f"times at {1.0 / interval:.6g} Hz: {origin}"
         return RunColumn(NO_CHANNEL, np.arange(count, dtype=np.float64) * interval, "s", "time", (why,))
     values, remarks = without_overflow(times.values)
     unit = stated_unit(choices.time_unit, ("time",), "--time-unit") or times.unit
     if unit and kind_of(unit) != "time":
-        what = f"'{one_line(times.name, 40)}' is in '{one_line(unit, 20)}', which is not a unit of time"
+        what = f"{times.quoted} is in '{one_line(unit, 20)}', which is not a unit of time"
         remedy = "give --time-unit, or --time with the name of another column"
         raise TunnelError(what, where=where, remedy=remedy)
     if not unit:
@@ -150,7 +148,7 @@ def _ask_for_unit(channel: Channel, kinds: Sequence[str], option: str, where: st
     """Refuse to guess the unit of a column whose name may contain a unit."""
     word = written_unit(channel.name, kinds)
     if word:
-        what = f"'{word}' in the name of '{one_line(channel.name, 40)}' may be its unit"
+        what = f"'{word}' in the name of {channel.quoted} may be its unit"
         allowed = ", ".join(name for kind in kinds for name in UNITS[kind])
         raise TunnelError(what, where=where, remedy=f"give {option}, one of {allowed}")
 
@@ -167,16 +165,13 @@ def refuse_without_unit(channels: Sequence[Channel], where: str) -> None:
     if not found:
         return
     noun = f"is {'an' if first == 'acceleration' else 'a'} {first} by its name, and nothing states its unit"
-    chosen = option = f'--angle "{one_line(found[0].name, 40)}"'
+    chosen = ""
     if len(found) > 1:
         noun = f"are {first}s by their names, and nothing states their unit"
-        chosen += ", or another of them,"
-    raise TunnelError(
-        f"{listed(found)} {noun}",
-        where=where,
-        remedy=f"give {chosen} and --unit, one of {', '.join(UNITS[first])}; or --unit deg if it is an angle",
-        options=(option,),
-    )
+        chosen = ", or another of them,"
+    units = f"{chosen} and --unit, one of {', '.join(UNITS[first])}; or --unit deg if it is an angle"
+    option = f'--angle "{one_line(found[0].name, 40)}"'
+    raise asking(option, f"{listed(found)} {noun}", where, units)
 
 
 def in_radians(
@@ -191,13 +186,13 @@ def in_radians(
     unit = stated_unit(choices.unit, kinds, "--unit") or reading.unit
     if unit and kind_of(unit) not in kinds and choices.counts_per_turn is None and calibration is None:
         raise TunnelError(
-            f"'{one_line(reading.name, 40)}' is in '{one_line(unit, 20)}', which is not a known unit of an angle",
+            f"{reading.quoted} is in '{one_line(unit, 20)}', which is not a known unit of an angle",
             where=where,
             remedy=f"give --unit ({', '.join(UNITS['angle'])} or another), --counts-per-turn N or --calibration",
         )
     values, remarks = without_overflow(timed)
     if not np.isfinite(values).any():
-        what = f"'{one_line(reading.name, 40)}' holds no number where the file states a time"
+        what = f"{reading.quoted} holds no number where the file states a time"
         raise TunnelError(what, where=where, remedy="leave the file out, or name another column by --angle")
     if calibration is not None:
         volts = values * UNITS["voltage"].get(unit, 1.0)
@@ -219,17 +214,14 @@ def in_radians(
         remarks.append(f"'{reading.name}' holds counts, {choices.counts_per_turn:g} per turn")
     if kind_of(unit) in ("counts", "voltage"):
         option = "--counts-per-turn N" if kind_of(unit) == "counts" else '--calibration "a + b*V"'
-        what = f"'{reading.name}' is in {unit}"
-        raise TunnelError(what, where=where, remedy=f"give {option}", options=(option,))
+        raise asking(option, f"'{reading.name}' is in {unit}", where)
     if not unit:
         if calibration is None:
             _ask_for_unit(reading, kinds, "--unit", where)
             refuse_without_unit([reading], where)
             if names_voltage(reading.name):
-                what = f"'{one_line(reading.name, 40)}' may be a voltage by its name, and nothing states its unit"
-                option = '--calibration "a + b*V"'
-                remedy = f"give {option}, or --unit if it is an angle"
-                raise TunnelError(what, where=where, remedy=remedy, options=(option,))
+                what = f"{reading.quoted} may be a voltage by its name, and nothing states its unit"
+                raise asking('--calibration "a + b*V"', what, where, ", or --unit if it is an angle")
         unit, swing = guessed_angle_unit(values)
         no_unit, change = f"the file states no unit of '{reading.name}'", "--unit changes this"
         remarks.append(
@@ -245,10 +237,8 @@ def in_radians(
     swing = 0.5 * float(np.nanmax(values) - np.nanmin(values))
     # A disc between springs swings as far, but counts look like degrees.
     if unit == "deg" and choices.unit is None and calibration is None and swing > _HALF_TURN:
-        what = f"'{one_line(reading.name, 40)}' would swing by more than half a turn in degrees"
-        option = "--counts-per-turn N"
-        remedy = f"give {option} for an encoder, or --unit deg if it does"
-        raise TunnelError(what, where=where, remedy=remedy, options=(option,))
+        what = f"{reading.quoted} would swing by more than half a turn in degrees"
+        raise asking("--counts-per-turn N", what, where, " for an encoder, or --unit deg if it does")
     return RunColumn(reading, values, unit, quantity, tuple(remarks))
 
 

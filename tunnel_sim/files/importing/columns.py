@@ -40,7 +40,7 @@ from tunnel_sim.files.importing.inputs import (
 from tunnel_sim.files.importing.remarks import doubt
 from tunnel_sim.files.importing.tables import NO_CHANNEL, Channel, RunColumn, Table, is_input
 from tunnel_sim.files.importing.units import claims, kind_of
-from tunnel_sim.vocabulary.errors import TunnelError, attempt, did_you_mean, joined, one_line
+from tunnel_sim.vocabulary.errors import TunnelError, asking, attempt, did_you_mean, joined, one_line
 from tunnel_sim.vocabulary.input_kinds import without_command
 
 _HEAD = 20_000  # samples of a column without a name that are inspected
@@ -130,7 +130,7 @@ def _as_numbers(
     if table.native:
         remarks += _apart(table, channel, driven, choices, where)
         if driven is not None and (outside := _without_input(reading, driven)).any():
-            remarks.append(f"'{driven.name}' has no sample at {outside.sum()} of {rows}: left out")
+            remarks.append(f"{driven.channel.quoted} has no sample at {outside.sum()} of {rows}: left out")
             reading = replace(reading, values=np.where(outside, np.nan, reading.values))
     return RunColumns(run.run, time, reading, driven, tuple(remarks))
 
@@ -143,7 +143,7 @@ def _unused(table: Table, columns: RunColumns, choices: ImportChoices) -> list[s
         for channel in _unconditional(table.channels, choices)
         if not any(channel is one for one in columns.used)
         and not is_time(channel)
-        and f"'{one_line(channel.name, 40)}'" not in named_before
+        and channel.quoted not in named_before
         and resembles(channel.name, channel.unit) is None
         and _span(channel) > 0.0
     ]
@@ -156,7 +156,7 @@ def _unused(table: Table, columns: RunColumns, choices: ImportChoices) -> list[s
             moving.append(channel)
     remarks: list[str] = [
         doubt(
-            f"'{one_line(c.name, 40)}' moves before or with the angle and is not used; "
+            f"{c.quoted} moves before or with the angle and is not used; "
             "--input uses it if it drives the body"
         )
         for c in moving
@@ -197,7 +197,7 @@ def _apart(
         column = Channel(name, np.empty(0), unit)
         stated = choices.input is not None and matches(column, choices.input)
         if stated or (choices.input is None and driven is None and names_input(column)):
-            what = f"'{one_line(name, 40)}' cannot be aligned with '{one_line(reading.name, 40)}': {why}"
+            what = f"'{one_line(name, 40)}' cannot be aligned with {reading.quoted}: {why}"
             option = "--input none"
             remedy = f"record both on one clock, or give {option} if it is a free decay"
             raise TunnelError(what, where=where, remedy=remedy, options=(option,))
@@ -275,8 +275,7 @@ def _pair(time: Channel, reading: Channel, run: str = "", said: tuple[str, ...] 
 def _refuse_without_angle(channels: Sequence[Channel], where: str) -> NoReturn:
     refuse_without_unit(channels, where)
     what = f"no column of angles (columns found: {listed(channels)})"
-    option = "--angle NAME"
-    raise TunnelError(what, where=where, remedy=f"give {option} and its --unit", options=(option,))
+    raise asking("--angle NAME", what, where, " and its --unit")
 
 
 def _chosen(block: Sequence[Channel], wanted: str, option: str, where: str) -> list[Channel]:
@@ -318,10 +317,7 @@ def _readings(
     of_runs = len({stem(c.name) for c in found}) == 1 and all(RUN_MARK.search(c.name) for c in found)
     if len(found) > 1 and not of_runs:
         what = f"{len(found)} columns may be the angle: {listed(found)}"
-        option = f'--angle "{found[0].name}"'
-        several = TunnelError(
-            what, where=where, remedy=f"give {option}, or another of them", options=(option,)
-        )
+        several = asking(f'--angle "{found[0].name}"', what, where, ", or another of them")
         raise Unread(several, _pair(time, found[0]))
     remarks += [f"angle from '{stem(channel.name)}'" for channel in found if len(others) > 1]
     return found, remarks

@@ -30,7 +30,7 @@ from tunnel_sim.files.importing.units import claims, known_unit, split_unit
 from tunnel_sim.files.plausible import plausible_values
 from tunnel_sim.files.toml_input import validate
 from tunnel_sim.vocabulary.campaign import needs_density
-from tunnel_sim.vocabulary.errors import TunnelError, counted, did_you_mean, one_line
+from tunnel_sim.vocabulary.errors import TunnelError, asking, counted, did_you_mean, one_line
 
 _OFF = 0.5  # of the range: the median of a wind speed that starts late is further from zero
 _EVEN = 1e-9  # of a value: a column that varies less is constant
@@ -176,8 +176,7 @@ def _from_facts(
                 conditions[key], names[key] = float(value) * factor, name
         elif sure:
             what = f"'{one_line(heading, 60)}' is not in a unit of {key} ({units_of(key or '')})"
-            option = f"--set {key}=NUMBER"
-            raise TunnelError(what, where=where, remedy=f"give {option}", options=(option,))
+            raise asking(f"--set {key}=NUMBER", what, where)
         elif hint := _hint(name, unit, key, float(value)):
             hints.append(hint)
     symbols = [hint for hint in hints if hint.key == "wind_speed" and np.isfinite(hint.value)]

@@ -96,7 +96,7 @@ def imported_run(
     if windy:
         held = {key: stated.pop(key) for key in ("spring_stiffness",) if key in stated}
         remarks.append(doubt(f"air_density is not stated (wind-on, {stated['wind_speed']:g} m/s)"))
-    drive, said = _drive(raw, kept, choices)
+    drive, said = _input(raw, kept, choices)
     remarks += said
     without_spring_needs_input((stated | held).get("spring_stiffness"), drive, where)
     time = from_zero(time)
@@ -159,7 +159,7 @@ def _left_out(error: TunnelError) -> str:
     return f"left out: {error.what}{kept}"
 
 
-def _drive(raw: RawRecord, kept: slice, choices: ImportChoices) -> tuple[Input | None, list[str]]:
+def _input(raw: RawRecord, kept: slice, choices: ImportChoices) -> tuple[Input | None, list[str]]:
     """The input of a run, and remarks; None for a free decay."""
     if raw.input is None:
         return None, []

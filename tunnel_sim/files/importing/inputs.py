@@ -13,7 +13,7 @@ from tunnel_sim.files.importing.column_names import ANGLE, named
 from tunnel_sim.files.importing.condition_names import condition_of
 from tunnel_sim.files.importing.remarks import doubt
 from tunnel_sim.files.importing.tables import Channel, RunColumn, is_input
-from tunnel_sim.vocabulary.errors import TunnelError, counted, did_you_mean, one_line
+from tunnel_sim.vocabulary.errors import TunnelError, asking, counted, did_you_mean, one_line
 from tunnel_sim.vocabulary.input_kinds import INPUTS, KINDS, Command, InputColumn
 from tunnel_sim.vocabulary.inputs import Input, checked_input
 from tunnel_sim.vocabulary.quantities import PerSample, Rows, Share
@@ -66,7 +66,7 @@ def find_input(
         stated = stated_input(channels, choices)
         if stated is not None and all(stated is not one for one in others):
             use = "times are" if stated is clock else "angle is"
-            column = f"'{one_line(choices.input, 40)}' is the column '{one_line(stated.name, 40)}'"
+            column = f"'{one_line(choices.input, 40)}' is the column {stated.quoted}"
             what = f"{column}, from which the {use} read"
             remedy = (
                 "give --input with the name or number of another column, or --angle with that of the angle"
@@ -96,19 +96,17 @@ def find_input(
     if len(commands) == 1 and not exact:
         beside = [
             doubt(
-                f"'{one_line(c.name, 40)}' moves before or with the angle and is not used; --input uses it "
-                f"instead of '{one_line(commands[0].name, 40)}'"
+                f"{c.quoted} moves before or with the angle and is not used; --input uses it "
+                f"instead of {commands[0].quoted}"
             )
             for c in candidates
             if c is not commands[0]
         ]
         candidates = commands
     if len(candidates) > 1:
-        listed = ", ".join(f"'{one_line(c.name, 40)}'" for c in candidates)
+        what = f"{len(candidates)} columns may be the input: {', '.join(c.quoted for c in candidates)}"
         option = f'--input "{one_line(candidates[0].name, 40)}"'
-        remedy = f"give {option}, another of them, or --input none"
-        what = f"{len(candidates)} columns may be the input: {listed}"
-        raise TunnelError(what, where=where, remedy=remedy, options=(option,))
+        raise asking(option, what, where, ", another of them, or --input none")
     return _as_input(candidates[0], reading, choices, where, beside) if candidates else None
 
 

@@ -36,7 +36,7 @@ from tunnel_sim.vocabulary.campaign import (
     RigProperties,
     SensorProperties,
 )
-from tunnel_sim.vocabulary.errors import TunnelError, attempt, did_you_mean, together
+from tunnel_sim.vocabulary.errors import TunnelError, asking, attempt, did_you_mean, together
 from tunnel_sim.vocabulary.record import Array
 
 _FINDERS: Mapping[Quantity, Callable[[Array, Array], list[RecordPiece]]] = {
@@ -243,9 +243,8 @@ def _sizes(parts: Sequence[ImportedRun], choices: ImportChoices) -> dict[str, fl
         for key, value in part.sizes.items():
             if common.setdefault(key, value) != value and getattr(choices.conditions, key) is None:
                 what = f"{key} = {value:g}, and {common[key]:g} in another run"
-                option, where = f"--set {key}=NUMBER", f"{shown(part.raw.source)}, run '{part.id}'"
-                remedy = f"give {option}, or import them separately"
-                raise TunnelError(what, where=where, remedy=remedy, options=(option,))
+                where = f"{shown(part.raw.source)}, run '{part.id}'"
+                raise asking(f"--set {key}=NUMBER", what, where, ", or import them separately")
     return common
 
 

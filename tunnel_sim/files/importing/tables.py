@@ -55,6 +55,11 @@ class Channel:
         object.__setattr__(self, "name", self.name[: limits.NAME_CHARACTERS])
         object.__setattr__(self, "values", np.where(np.isnan(self.values), np.nan, self.values))
 
+    @property
+    def quoted(self) -> str:
+        """Its name in a message."""
+        return f"'{one_line(self.name, 40)}'"
+
 
 @dataclass(frozen=True, eq=False)
 class RunColumn:
@@ -73,11 +78,6 @@ class RunColumn:
     unit: str
     role: str
     why: tuple[str, ...] = ()
-
-    @property
-    def name(self) -> str:
-        """Its name in a message."""
-        return one_line(self.channel.name, 40)
 
 
 NO_CHANNEL = Channel("", np.empty(0))

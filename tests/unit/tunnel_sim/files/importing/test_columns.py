@@ -54,7 +54,7 @@ def test_numbers_stated_above_the_table_are_in_seconds_and_hertz() -> None:
 def pairs(*channels: Channel, headed: bool = True, **choices: object):
     """What is taken of some columns, by name, and why."""
     found = find_pairs(Table(channels, headed=headed), ImportChoices(**choices), "log.csv")  # type: ignore[arg-type]
-    taken = [(pair.run, pair.time.name or None, pair.reading.name) for pair in found]
+    taken = [(pair.run, pair.time.channel.name or None, pair.reading.channel.name) for pair in found]
     return taken, [words for pair in found for words in pair.said]
 
 

@@ -208,7 +208,7 @@ def columns(*names: str) -> Table:
 @pytest.mark.parametrize("names", [("time", "a", "time", "b"), ("t#1", "a", "clock#2", "b")])
 def test_columns_are_several_records_where_the_times_are_repeated(names: tuple[str, ...]) -> None:
     pairs = find_pairs(columns(*names), ImportChoices(), "")
-    assert [(pair.time.name, pair.reading.name) for pair in pairs] == [names[:2], names[2:]]
+    assert [(pair.time.channel.name, pair.reading.channel.name) for pair in pairs] == [names[:2], names[2:]]
 
 
 def test_columns_are_one_record_where_the_times_have_different_names() -> None:
