@@ -44,11 +44,11 @@ class Unstated(TunnelError):
 
 @dataclass(frozen=True, eq=False)
 class Stated:
-    """The statements of the table of a record.
+    """The statements of a table.
 
     Args:
         numbers: conditions and sizes by key of `Conditions`, in its units.
-        columns: columns of conditions by key, with the rows of the record.
+        columns: columns of conditions by key.
         named: conditions in the name of the file, by key.
         hints: unused numbers of the file.
         like: unused columns that resemble conditions, with their hints.
@@ -60,20 +60,12 @@ class Stated:
     hints: tuple[Hint, ...] = ()
     like: tuple[tuple[Channel, Hint], ...] = ()
 
-    def of_rows(self, rows: NDArray[np.intp]) -> Stated:
-        """The statements in some rows."""
-        return replace(
-            self,
-            columns={key: replace(c, values=c.values[rows]) for key, c in self.columns.items()},
-            like=tuple((replace(c, values=c.values[rows]), hint) for c, hint in self.like),
-        )
-
-    def measured(self, rows: NDArray[np.bool_]) -> tuple[dict[str, float], list[str]]:
+    def measured(self, rows: NDArray[np.intp]) -> tuple[dict[str, float], list[str]]:
         """Conditions stated by columns in some rows, and remarks on them."""
         stated = {
             key: (value, remark)
             for key, column in self.columns.items()
-            for value, remark in _from_column(key, column, rows)
+            for value, remark in _from_column(key, column, rows, in_si(key, column.unit) or 1.0)
         }
         remarks = [remark for _, remark in stated.values() if remark]
         names = [(key, self.columns[key].name) for key in stated]
@@ -84,11 +76,11 @@ class Stated:
             remarks.append(f"from columns: {listed}")
         return {key: value for key, (value, _) in stated.items()}, remarks
 
-    def unused(self, rows: NDArray[np.bool_]) -> list[Hint]:
+    def unused(self, rows: NDArray[np.intp]) -> list[Hint]:
         """Unused content that resembles a condition in some rows; a column about zero does not."""
         found = [*self.hints]
         for column, hint in self.like:
-            values = _from_column(hint.key, replace(column, unit=""), rows)
+            values = _from_column(hint.key, column, rows, 1.0)
             found += [replace(hint, value=value) for value, _ in values if np.isfinite(value)]
         return found
 
@@ -229,13 +221,14 @@ def _hint(name: str, unit: str, key: str | None, value: float) -> Hint | None:
     return Hint(key, value, what, why, use, option=option)
 
 
-def _from_column(key: str, column: Channel, rows: NDArray[np.bool_]) -> Iterator[tuple[float, str]]:
+def _from_column(
+    key: str, column: Channel, rows: NDArray[np.intp], factor: float
+) -> Iterator[tuple[float, str]]:
     """The condition of a run stated by a column, in the unit of `Conditions`, and a remark; nothing without one."""
     values = column.values[rows]
     values = values[np.isfinite(values)]
     if not values.size:
         return
-    factor = in_si(key, column.unit) or 1.0
     low, middle, high = map(float, np.quantile(values, (0.05, 0.5, 0.95)))
     if high - low <= _EVEN * abs(middle):
         yield middle * factor, ""
@@ -265,7 +258,7 @@ def conditions_of(
     stated: Stated,
     file: Path,
     run: str,
-    rows: NDArray[np.bool_],
+    rows: NDArray[np.intp],
     choices: ImportChoices,
     table: ConditionTable | None,
     where: str,
@@ -300,7 +293,7 @@ def ask_conditions(
         hints: conditions that the name of the file seems to state; the others are as above.
     """
     stated, _ = find_conditions(table, beside, choices, where)
-    rows = np.ones(table.channels[0].values.size, dtype=bool)
+    rows = np.arange(table.channels[0].values.size)
     given = choices.conditions.model_dump(exclude_none=True)
     known = {**stated.numbers, **stated.measured(rows)[0], **named, **given}
     open_conditions(known, known, [*stated.unused(rows), *hints], "", where, driven=True, later=later)

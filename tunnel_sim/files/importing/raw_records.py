@@ -46,7 +46,8 @@ class RawRecord:
 
     Args:
         reading: its column.
-        stated: the conditions stated in the file, in numbers and in the rows of the record.
+        stated: the conditions stated in its table.
+        table_rows: its rows there.
         clock: of these rows, from the first sample on, s; NaN where there is no time.
         whole: whether the file itself states that it is one run.
         input: of a driven record, at the cleaned times; None for free decays.
@@ -59,6 +60,7 @@ class RawRecord:
     cleaned: Cleaned
     stated: Stated
     said: tuple[str, ...]
+    table_rows: NDArray[np.intp]
     clock: Rows
     whole: bool
     input: RunColumn | None = None
@@ -69,9 +71,9 @@ class RawRecord:
         """The quantity of the reading."""
         return cast(Quantity, self.reading.role)
 
-    def rows(self, first: Seconds, last: Seconds) -> NDArray[np.bool_]:
-        """Which rows of the record belong to a run from its first to its last sample."""
-        return (self.clock >= first) & (self.clock <= last)
+    def rows(self, first: Seconds, last: Seconds) -> NDArray[np.intp]:
+        """The rows of its table that belong to a run from its first to its last sample."""
+        return self.table_rows[(self.clock >= first) & (self.clock <= last)]
 
 
 def raw_records(source: Source, beside: ImportStatements) -> list[RawRecord]:
@@ -165,8 +167,9 @@ def _records(
                 source=path,
                 reading=columns.reading,
                 cleaned=clean,
-                stated=stated.of_rows(rows),
+                stated=stated,
                 said=(*remarks, *clean.said),
+                table_rows=rows,
                 clock=time[a:b] - np.nanmin(np.where(np.isfinite(readings[a:b]), time[a:b], np.nan)),
                 whole=table.named and len(starts) == 2,
                 input=given,
