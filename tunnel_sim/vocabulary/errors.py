@@ -88,17 +88,17 @@ def _options(faults: Iterable[TunnelError]) -> Iterator[str]:
 
 def together(faults: Sequence[TunnelError]) -> TunnelError:
     """Refusals of several places, at least one, as one refusal; equal ones are stated once, with their places."""
-    if len(faults) == 1:
+    parts = _parts(faults)
+    if len(faults) == 1 and len({part.where for part in parts}) == 1:
         return faults[0]
-    faults = _parts(faults)
     places: dict[tuple[str, str], dict[str, None]] = {}
-    for fault in faults:
+    for fault in parts:
         places.setdefault((fault.what, fault.remedy), {})[fault.where] = None
     found = []
     for (what, remedy), names in places.items():
         more = f" and {len(names) - _PLACES} more" if len(names) > _PLACES else ""
         found.append((what, ", ".join([*names][:_PLACES]) + more, remedy))
-    options = _options(faults)
+    options = _options(parts)
     if len(found) == 1:
         ((what, where, remedy),) = found
         return TunnelError(what, where=where, remedy=remedy, options=options)

@@ -83,16 +83,19 @@ def raw_records(source: Source, beside: ImportStatements) -> list[RawRecord]:
     long = [table for table in source.tables if table.channels[0].values.size >= LEAST_ROWS]
     short = [hint for table in source.tables if long and table not in long for hint in of_short_table(table)]
     found = []
+    faults: list[TunnelError] = []  # what is to be stated of a file is asked for at once
     for table in with_readings(long or source.tables, choices, shown(path)):
         where = shown(path) + (f", {one_line(table.part)}" if table.part else "")
         try:
             runs = find_columns(table, choices, beside.calibration, where)
-        except Unread as fault:
-            faults: list[TunnelError] = [fault]  # what is to be stated of a file is asked for at once
+        except TunnelError as fault:
+            faults.append(fault)
+            if not isinstance(fault, Unread):
+                break
             known, hints, used = beside.of_file(path), beside.hints[path], fault.columns.used
             asked = partial(ask_conditions, table, used, choices, known, hints, where, later=beside.later)
             attempt(faults, asked)
-            raise joined(faults) from None
+            continue
         for columns in runs:
             stated, remarks = find_conditions(table, columns.used, choices, where)
             stated = replace(stated, named=named, hints=(*stated.hints, *short))
@@ -100,6 +103,8 @@ def raw_records(source: Source, beside: ImportStatements) -> list[RawRecord]:
             name = one_line("-".join(part for part in (file, table.part, columns.run) if part))
             remarks += [stated_remark(key, value, "the file's name") for key, value in named.items()]
             found += _records(name, path, table, columns, stated, remarks, choices, where)
+    if faults:
+        raise joined(faults)
     return found
 
 

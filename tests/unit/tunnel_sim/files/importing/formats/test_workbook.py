@@ -13,6 +13,7 @@ import xlsxwriter
 from tests.support.import_files import decay
 from tunnel_sim.files.importing.conditions import Unstated
 from tunnel_sim.files.importing.records import Imported, read_records
+from tunnel_sim.vocabulary.errors import TunnelError
 
 TIME, ANGLE = decay()
 Rows = Sequence[Sequence[Any]]
@@ -148,3 +149,14 @@ def test_a_sheet_that_no_row_names_is_not_taken_for_wind_off(tmp_path: Path) -> 
     table = [("Blatt", "V [m/s]", "rho"), ("A", 12, 1.2)]
     with pytest.raises(Unstated, match="run 'B': 'V' of 1 value in 'Bedingungen'"):
         read_records([book(tmp_path, {"A": None, "B": None, "Bedingungen": table})])
+
+
+def test_what_the_sheets_leave_open_is_asked_for_at_once(tmp_path: Path) -> None:
+    counts = [("t [s]", "enc [counts]"), *zip(TIME, np.round(1e4 * ANGLE), strict=True)]
+    two = [("t [s]", "yaw [rad]", "pitch [rad]"), *zip(TIME, ANGLE, 0.9 * ANGLE, strict=True)]
+    with pytest.raises(TunnelError) as caught:
+        read_records([book(tmp_path, {"A": counts, "B": two, "C": counts, "D": None})])
+    assert caught.value.options == ("--counts-per-turn N", '--angle "yaw"')
+    said = str(caught.value)
+    assert f"{tmp_path / 'rig.xlsx'}, A, {tmp_path / 'rig.xlsx'}, C: 'enc' is in counts; give" in said
+    assert "rig.xlsx, B: 2 columns may be the angle: 'yaw', 'pitch'; give" in said
