@@ -45,7 +45,7 @@ class RawRecord:
     """A record of a file, cleaned but not yet cut.
 
     Args:
-        reading: its column.
+        reading: its column, at the cleaned times.
         stated: the conditions stated in its table.
         table_rows: its rows there.
         clock: of these rows, from the first sample on, s; NaN where there is no time.
@@ -170,7 +170,7 @@ def _records(
             RawRecord(
                 id=name if len(starts) == 2 else f"{name}-{place}",
                 source=path,
-                reading=columns.reading,
+                reading=replace(columns.reading, values=clean.reading),
                 cleaned=clean,
                 stated=stated,
                 said=(*remarks, *clean.said),
