@@ -205,6 +205,21 @@ def waterfall_table(waterfall: Waterfall, misfit: Misfit) -> TextTable:
     return TextTable(title, heads, tuple(rows), heads[1:], names=heads[:1])
 
 
+def shares_of_gap(waterfall: Waterfall) -> dict[str, tuple[float, str]]:
+    """By cause, its share of the gap as the causes are added, and those with which it was added."""
+    found: dict[str, tuple[float, str]] = {}
+    taken = waterfall.steps
+    if not taken or taken[0].excess <= 0.0:
+        return found
+    for before, step in pairwise(taken):
+        names = str(step.effect).split(" + ")
+        part = max(before.excess, 0.0) - max(step.excess, 0.0)
+        for name in names:
+            others = [other for other in names if other != name]
+            found[name] = (part / taken[0].excess, f" together with {plain(*others)}" if others else "")
+    return found
+
+
 TESTS = {
     "below": "residual power below half the frequency f₀ of the oscillation",
     "f0": "residual power at f₀, from 0.5 to 1.5 f₀: the oscillation itself",

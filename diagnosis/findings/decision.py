@@ -6,8 +6,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from diagnosis.findings.terms import CHANNELS, among_answers, without_scatter
 from diagnosis.settings import AnswerSettings
-from identification.show.numbers import share
+from identification.show.numbers import listed, plain, probability, share
 from tunnel_sim.effects import BetweenRuns, known_effects
 from tunnel_sim.files.from_json import from_json_fields
 from tunnel_sim.files.writing import as_json
@@ -18,6 +19,8 @@ predicts less is fitted to chance."""
 LEFT_OF_SWING: Final = 0.1
 """Maximum root mean square residual of a decided answer, as a share of that of the readings about their mean.
 Judgement. A model that misses a tenth of the motion lacks a part of it."""
+ANSWERS_NAMED: Final = 5
+"""Maximum number of likely answers in a sentence. Judgement."""
 IN_COMMON: Final = 0.9
 """Minimum probability of an effect or a channel that is common to the likely answers. Convention."""
 
@@ -115,6 +118,44 @@ class Decision:
     channels: Mapping[str, float]
     unpredictive: str = ""
     doubts: tuple[Doubt, ...] = ()
+
+    @property
+    def in_doubt_of_place(self) -> bool:
+        """Whether the residuals show another place than the causes of the answer."""
+        return any(one.kind == "elsewhere" for one in self.doubts)
+
+    def words(self, runs: str) -> str:
+        """Sentences on an undecided diagnosis: the common part of its answers and the alternatives.
+
+        Args:
+            runs: that show the gap, in words.
+        """
+        channels = {kind.name: kind.channel for kind in known_effects()}
+        effects = {name: self.effects[name] for name in without_scatter(self.effects)}
+        named = {channels[name] for name in effects}
+        common_to_all = [f"{plain(name)} ({probability(value)})" for name, value in effects.items()]
+        parts = [f"contain {listed(common_to_all)}"] if common_to_all else []
+        for name, value in self.channels.items():
+            if name not in named:
+                parts.append(f"act on {CHANNELS[name]} ({probability(value)})")
+        said = f"The likely answers {' and '.join(parts)}. " if parts else ""
+        together = probability(sum(value for _, value in self.credible))
+        if self.unpredictive:
+            best = among_answers(self.unpredictive).capitalize()
+            fit = "fits" if len(without_scatter(self.unpredictive.split(" + "))) == 1 else "fit"
+            said += f"{best} {fit} best, but {' and '.join(one.words for one in self.doubts)}"
+            said += f": look at {runs} there first. " if self.in_doubt_of_place else ". "
+        return (
+            f"{said}The answer is one of these, with a total probability of {together}: {self._likeliest()}."
+        )
+
+    def _likeliest(self) -> str:
+        """The likely answers with their probabilities, most probable first."""
+        shown = self.credible[:ANSWERS_NAMED]
+        answers = [f"{among_answers(effect)} ({probability(value)})" for effect, value in shown]
+        if more := len(self.credible) - len(shown):
+            answers.append(f"{more} more")
+        return answers[0] if len(answers) == 1 else f"{', '.join(answers[:-1])} or {answers[-1]}"
 
     def to_json_dict(self) -> dict[str, Any]:
         """The fields ``decided``, ``unpredictive``, ``doubts``, ``credible`` and ``common`` of a document."""

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from diagnosis.findings.finding import NextStep
+from diagnosis.findings.terms import named_runs
 from diagnosis.search.disturbance import Disturbance
 
 
@@ -41,3 +44,12 @@ def disturbed_step(found: Disturbance) -> NextStep:
         "and its filter",
         again,
     )
+
+
+def odd_runs(found: Sequence[Disturbance]) -> str:
+    """Disturbed runs and runs that differ from the others, after a semicolon; empty without any."""
+    disturbed = [one.run for one in found if one.at_s is not None]
+    odd = [one.run for one in found if one.at_s is None]
+    said = f"; {named_runs(disturbed)} disturbed" if disturbed else ""
+    differ = "differ from the others" if len(odd) > 1 else "differs from the others"
+    return said + (f"; {named_runs(odd)} {differ}" if odd else "")

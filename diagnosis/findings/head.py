@@ -8,7 +8,9 @@ from dataclasses import dataclass
 
 from diagnosis.findings.candidates import Candidate
 from diagnosis.findings.cautions import CAUTIONS, said
-from diagnosis.findings.next_steps import next_steps, shares_of_gap
+from diagnosis.findings.closure import shares_of_gap
+from diagnosis.findings.disturbed_runs import odd_runs
+from diagnosis.findings.next_steps import next_steps
 from diagnosis.findings.terms import (
     BETWEEN_RUNS,
     CHANNELS,
@@ -17,7 +19,7 @@ from diagnosis.findings.terms import (
     scattering,
     without_scatter,
 )
-from diagnosis.findings.verdict import headline, odd_runs
+from diagnosis.findings.verdict import headline
 from diagnosis.findings.whole import Findings
 from diagnosis.search.weigh import UNKNOWN
 from identification.printing import COEFFICIENTS
@@ -91,16 +93,16 @@ class Head:
 def _what(answer: Findings) -> str:
     if answer.cycling:
         return "No run is a free decay, so no cause is named"
-    causes, odd = answer.causes, odd_runs(answer)
+    causes, odd = answer.causes, odd_runs(answer.disturbed)
     if not causes:
         return f"No gap: the model agrees with the runs{odd}"
-    if not answer.decision.decided:
+    if not answer.decided:
         known = without_scatter(answer.decision.effects)
         part = f": {plain(*known)}, and perhaps more" if known else ""
         return f"A gap of undecided cause{part}{odd}"
     if causes == UNKNOWN:
         return f"A gap that no known effect explains{_place(answer)}{odd}"
-    parts, most = shares_of_gap(answer), _MOST_SIZED
+    parts, most = shares_of_gap(answer.waterfall), _MOST_SIZED
     certain: list[str] = without_scatter(causes)
     alternatives: list[tuple[str, float]] = []
     if answer.ambiguous_with:
@@ -174,7 +176,7 @@ def _sure(answer: Findings) -> str:
         return (
             f"Nothing beyond chance (p {p_text(answer.gap.p_value)}; false alarms in {alarms} of campaigns)"
         )
-    if not answer.decision.decided:
+    if not answer.decided:
         return f"Not yet: {'; '.join(_likeliest(answer))}"
     rest = ""
     if answer.rest_is_material and answer.names_effects:
@@ -233,7 +235,7 @@ def _costs(answer: Findings) -> str:
         return f"Nothing: {stated}"
     if causes == UNKNOWN:
         return f"Not corrected: {stated}{_further(answer)}"
-    return f"{stated}{_further(answer)}" if answer.decision.decided else f"Over the likely answers: {stated}"
+    return f"{stated}{_further(answer)}" if answer.decided else f"Over the likely answers: {stated}"
 
 
 _MOST_STATED = 3  # coefficients

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
 
+from diagnosis.findings.closure import shares_of_gap
 from diagnosis.findings.disturbed_runs import disturbed_step
 from diagnosis.findings.finding import NextStep
 from diagnosis.findings.input_hold import hold_steps
 from diagnosis.findings.next_run import OTHER_INPUT, NextRun, source_of_width
 from diagnosis.findings.patch import model_steps
+from diagnosis.findings.place import runs_of_the_gap
 from diagnosis.findings.repeatability import width_text
 from diagnosis.findings.spring_choices import choice_steps
 from diagnosis.findings.terms import CHANNELS, CONDITIONS, SCATTERS, without_scatter
-from diagnosis.findings.verdict import in_doubt_of_place, runs_of_the_gap
 from diagnosis.findings.whole import Findings
 from diagnosis.search.weigh import UNKNOWN
 from identification.printing import COEFFICIENTS
@@ -35,7 +35,7 @@ def steps(answer: Findings) -> list[NextStep]:
 
     Without a cause to act on, runs that do not count come first.
     """
-    causes, decided = answer.causes, answer.decision.decided
+    causes, decided = answer.causes, answer.decided
     runs = [*map(disturbed_step, answer.disturbed), *_remedies(answer.remarks)]
     runs += answer.repeated.steps(answer)
     if not causes and any(remark.withholds for remark in answer.remarks):
@@ -75,7 +75,7 @@ _NO_REPAIR = NextStep(
 
 def _mending(answer: Findings) -> Iterator[NextStep]:
     """What to do about each cause, and what tells open causes apart, the largest share of the gap first."""
-    parts = shares_of_gap(answer)
+    parts = shares_of_gap(answer.waterfall)
     of_spring = {kind.name for kind in known_effects() if kind.chosen_spring()}
     certain = answer.named_causes.certain_and_open()[0] if answer.ambiguous_with else answer.causes
     names = [name for name in answer.causes if name not in of_spring or not answer.found.choices]
@@ -133,21 +133,6 @@ def _corrects(answer: Findings) -> str:
 _VISIBLE = 0.01  # of a coefficient: a smaller change is not worth a word
 
 
-def shares_of_gap(answer: Findings) -> dict[str, tuple[float, str]]:
-    """By cause, its share of the gap as the causes are added, and those with which it was added."""
-    found: dict[str, tuple[float, str]] = {}
-    taken = answer.waterfall.steps
-    if not taken or taken[0].excess <= 0.0:
-        return found
-    for before, step in pairwise(taken):
-        names = str(step.effect).split(" + ")
-        part = max(before.excess, 0.0) - max(step.excess, 0.0)
-        for name in names:
-            others = [other for other in names if other != name]
-            found[name] = (part / taken[0].excess, f" together with {plain(*others)}" if others else "")
-    return found
-
-
 def _expected(answer: Findings) -> str:
     """What a further diagnosis should find."""
     gap = answer.gap
@@ -180,7 +165,7 @@ def unplannable(answer: Findings) -> str:
 
 def rival_lines(answer: Findings) -> list[str]:
     """Effects that the runs cannot distinguish from the causes, and the run that could; none without a rival."""
-    decided = answer.decision.decided
+    decided = answer.decided
     rivals, run = answer.ambiguous_with if decided else (), answer.next_run
     lines = []
     if rivals:
@@ -216,9 +201,10 @@ def _telling_apart(answer: Findings) -> Iterator[NextStep]:
 
 def _deciding(answer: Findings) -> Iterator[NextStep]:
     """What decides between the likely answers."""
-    if in_doubt_of_place(answer):
+    if answer.decision.in_doubt_of_place:
+        runs = runs_of_the_gap(answer.where, answer.found.place)
         yield NextStep(
-            f"Look at {runs_of_the_gap(answer)} where the residuals point (Where), before any cause",
+            f"Look at {runs} where the residuals point (Where), before any cause",
             "the likeliest cause acts elsewhere",
         )
     run, robot = run_to_make(answer), answer.found.robot

@@ -17,7 +17,7 @@ from diagnosis.findings.place_figures import (
     runs_figure,
     spectrum_figure,
 )
-from diagnosis.findings.terms import BANDS, CHANNELS, CONDITIONS, scattering
+from diagnosis.findings.terms import BANDS, CHANNELS, CONDITIONS, named_runs, scattering
 from diagnosis.model.fact import Fact
 from diagnosis.where.described import BETWEEN_RUNS, Nowhere, PlaceFound, Where
 from diagnosis.where.maps import Maps
@@ -157,6 +157,11 @@ def _places(where: Where, place: PlaceFound) -> list[str]:
     if "frequency_hz" in place.narrow and where.frequency_hz is not None:
         places.append("at {:.2f} to {:.2f} Hz".format(*where.frequency_hz))
     return places
+
+
+def runs_of_the_gap(where: Where, place: PlaceFound | None) -> str:
+    """The runs that show the gap, by name where not all do."""
+    return named_runs(where.runs) if place and 0 < len(where.runs) < place.runs else "the runs"
 
 
 def _agreement(where: Where, place: PlaceFound) -> str:

@@ -145,7 +145,7 @@ def _which(answer: Findings) -> Section:
 def _causes(answer: Findings) -> Section:
     cards = cause_cards(answer)
     title = "The cause" if len(cards) == 1 else "The causes"
-    if not answer.decision.decided:
+    if not answer.decided:
         title += f" of the {answer.set_out}"
     return Section(
         "found",
@@ -318,7 +318,7 @@ def diagnosis_brief(answer: Findings) -> str:
     gap, first = answer.gap, answer.candidates[0]
     causes = answer.causes
     named = named_answer(causes).lower() if causes else "no gap"
-    decided = answer.decision.decided
+    decided = answer.decided
     undecided = "" if decided else f"undecided, the {answer.set_out} is "
     misfit, excess = answer.misfit, gap.excess_before
     size = (

@@ -94,6 +94,20 @@ def scattering(names: Iterable[str]) -> list[str]:
     return [name for name in names if name in SCATTERS]
 
 
+def named_runs(names: Sequence[str]) -> str:
+    """Runs by their ids, such as ``runs r01, r02``."""
+    return f"run{'s' if len(names) > 1 else ''} {', '.join(names)}"
+
+
+def among_answers(effect: str) -> str:
+    """An answer by name, without scatter between runs, which is stated for all answers together."""
+    names = effect.split(" + ")
+    proper = without_scatter(names)
+    if effect == "unknown":
+        return "an unknown cause"
+    return plain(*proper) if proper else BETWEEN_RUNS if scattering(names) else plain(effect)
+
+
 def named_answer(causes: Sequence[str]) -> str:
     """The causes in a few words, such as ``coulomb friction, and scatter between runs``."""
     proper = without_scatter(causes)

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Final
+from typing import Any
 
 from diagnosis.findings.coefficients import consequence
-from diagnosis.findings.disturbed_runs import disturbed_words
+from diagnosis.findings.disturbed_runs import disturbed_words, odd_runs
 from diagnosis.findings.input_hold import hold_words
 from diagnosis.findings.other_motions import second_mode_words
 from diagnosis.findings.patch import model_words
+from diagnosis.findings.place import runs_of_the_gap
 from diagnosis.findings.spring_choices import choice_words, two_springs_words
 from diagnosis.findings.terms import (
     BETWEEN_RUNS,
     CHANNELS,
     CONDITIONS,
     named_answer,
-    scattering,
     without_scatter,
 )
 from diagnosis.findings.whole import Findings
@@ -24,17 +24,13 @@ from diagnosis.search.weigh import UNKNOWN
 from identification.printing import COEFFICIENTS
 from identification.show.numbers import (
     beside_noise,
-    listed,
     plain,
     probability,
     rounded_up,
     share,
 )
-from tunnel_sim.effects import effect_class, known_effects, the_effect
+from tunnel_sim.effects import effect_class, the_effect
 from tunnel_sim.effects.capabilities import InputClock
-
-ANSWERS_NAMED: Final = 5
-"""Maximum number of likely answers in a sentence. Judgement."""
 
 
 def headline(answer: Findings) -> tuple[str, str]:
@@ -45,28 +41,14 @@ def headline(answer: Findings) -> tuple[str, str]:
         words = words.replace(delay, f"{delay} or wrong hold")
     if kind == "found" and not without_scatter(answer.causes) and answer.repeated.systematic(answer):
         words = f"{BETWEEN_RUNS.capitalize()}, not by chance alone"
-    return words + odd_runs(answer), kind
-
-
-def odd_runs(answer: Findings) -> str:
-    """Disturbed runs and runs that differ from the others, after a semicolon; empty without any."""
-    disturbed = [one.run for one in answer.disturbed if one.at_s is not None]
-    odd = [one.run for one in answer.disturbed if one.at_s is None]
-    said = f"; {_runs(disturbed)} disturbed" if disturbed else ""
-    differ = "differ from the others" if len(odd) > 1 else "differs from the others"
-    return said + (f"; {_runs(odd)} {differ}" if odd else "")
-
-
-def _runs(names: Sequence[str]) -> str:
-    """Runs by their ids."""
-    return f"run{'s' if len(names) > 1 else ''} {', '.join(names)}"
+    return words + odd_runs(answer.disturbed), kind
 
 
 def _answer_in_words(answer: Findings) -> tuple[str, str]:
     causes = answer.causes
     if not causes:
         return "No gap", "none"
-    if not answer.decision.decided:
+    if not answer.decided:
         effects, channels = without_scatter(answer.decision.effects), answer.decision.channels
         known = plain(*effects) if effects else " and ".join(CHANNELS[name] for name in channels)
         return f"Undecided: {known}, and more" if known else "Undecided", "open"
@@ -115,11 +97,12 @@ def _answer(answer: Findings, rest: str) -> str:
     there_is = f"There is a gap ({size})."
     proper = without_scatter(causes)
     explained = f"{share(gap.closed)} of the gap {gap.closed_on}."
-    if not answer.decision.decided:
+    if not answer.decided:
         sentence = f"{there_is} Its cause is undecided."
         first = f"{_sentence(plain(*proper))} {_explain(proper)}" if proper else "These differences explain"
         by_first = "" if causes == UNKNOWN else f"{first} {explained}"
-        return " ".join(filter(None, (sentence, undecided_words(answer), repeats, by_first)))
+        likely = answer.decision.words(runs_of_the_gap(answer.where, facts.place))
+        return " ".join(filter(None, (sentence, likely, repeats, by_first)))
     if causes == UNKNOWN:
         nearly = "" if facts.nearly is None else facts.nearly.words
         sentence = (
@@ -161,62 +144,6 @@ def _sentence(words: str) -> str:
 def _explain(subjects: Sequence[str]) -> str:
     """The verb for one or several subjects."""
     return "explain" if len(subjects) > 1 else "explains"
-
-
-def undecided_words(answer: Findings) -> str:
-    """Sentences on an undecided diagnosis: the common part of its answers and the alternatives."""
-    decision, credible = answer.decision, answer.decision.credible
-    channels = {kind.name: kind.channel for kind in known_effects()}
-    effects = {name: decision.effects[name] for name in without_scatter(decision.effects)}
-    named = {channels[name] for name in effects}
-    common_to_all = [f"{plain(name)} ({probability(value)})" for name, value in effects.items()]
-    parts = [f"contain {listed(common_to_all)}"] if common_to_all else []
-    for name, value in decision.channels.items():
-        if name not in named:
-            parts.append(f"act on {CHANNELS[name]} ({probability(value)})")
-    said = f"The likely answers {' and '.join(parts)}. " if parts else ""
-    most = likeliest(answer, ANSWERS_NAMED)
-    together = probability(sum(value for _, value in credible))
-    if answer.decision.unpredictive:
-        best = among_answers(answer.decision.unpredictive).capitalize()
-        doubts = [one.words for one in answer.decision.doubts]
-        fit = "fits" if len(without_scatter(answer.decision.unpredictive.split(" + "))) == 1 else "fit"
-        said += f"{best} {fit} best, but {' and '.join(doubts)}"
-        said += f": look at {runs_of_the_gap(answer)} there first. " if in_doubt_of_place(answer) else ". "
-    return f"{said}The answer is one of these, with a total probability of {together}: {most}."
-
-
-def likeliest(answer: Findings, count: int = 2) -> str:
-    """The likely answers of an undecided diagnosis with their probabilities, most probable first.
-
-    Args:
-        count: most that are named.
-    """
-    credible = answer.decision.credible
-    answers = [f"{among_answers(effect)} ({probability(value)})" for effect, value in credible[:count]]
-    if len(credible) > count:
-        answers.append(f"{len(credible) - count} more")
-    return answers[0] if len(answers) == 1 else f"{', '.join(answers[:-1])} or {answers[-1]}"
-
-
-def in_doubt_of_place(answer: Findings) -> bool:
-    """Whether the answer is undecided because the residuals show another place than its causes."""
-    return any(one.kind == "elsewhere" for one in answer.decision.doubts)
-
-
-def runs_of_the_gap(answer: Findings) -> str:
-    """The runs that show the gap, by name where not all do."""
-    runs, place = answer.where.runs, answer.found.place
-    return _runs(runs) if place is not None and 0 < len(runs) < place.runs else "the runs"
-
-
-def among_answers(effect: str) -> str:
-    """An answer by name, without scatter between runs, which is stated for all answers together."""
-    names = effect.split(" + ")
-    proper = without_scatter(names)
-    if effect == "unknown":
-        return "an unknown cause"
-    return plain(*proper) if proper else BETWEEN_RUNS if scattering(names) else plain(effect)
 
 
 def _immaterial(changes: Mapping[str, float]) -> str:

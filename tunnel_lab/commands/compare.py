@@ -189,7 +189,7 @@ def _gap_and_answer(answers: Sequence[Diagnosis]) -> list[ComparedRow]:
         ComparedRow(("residual gap",), after, "× noise variance"),
         ComparedRow(("share explained",), explained, "%", labelled=False),
         ComparedRow(("causes",), [Entry(",\n".join(d.causes) or "none") for d in answers]),
-        ComparedRow(("decided",), [Entry("yes" if d.decision.decided else "no") for d in answers]),
+        ComparedRow(("decided",), [Entry("yes" if d.decided else "no") for d in answers]),
         ComparedRow(("or instead",), [Entry(",\n".join(d.ambiguous_with) or _NONE) for d in answers]),
         ComparedRow(
             ("probability",),

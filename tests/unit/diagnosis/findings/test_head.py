@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from diagnosis.findings.closure import shares_of_gap
 from diagnosis.findings.decision import decision
 from diagnosis.findings.head import Head
-from diagnosis.findings.next_steps import next_steps, shares_of_gap
+from diagnosis.findings.next_steps import next_steps
 from diagnosis.findings.verdict import verdict
 from diagnosis.settings import Settings
 from identification.show.blocks import as_text
@@ -114,7 +115,7 @@ def test_steps_are_ordered_by_the_share_of_the_gap_and_scatter_comes_after_the_c
     given = two_causes(causes=[DRY, "damping_scatter", SPRING])
     given["candidates"][0]["effect"] += " + damping_scatter"
     answer = findings_of(given)
-    parts = shares_of_gap(answer)
+    parts = shares_of_gap(answer.waterfall)
     assert (parts[SPRING][0], parts[DRY][0]) == (pytest.approx(0.6), pytest.approx(0.4))
     spring, dry, bearing, *_ = next_steps(answer)
     assert spring.endswith("removes 60.0 % of the gap.")

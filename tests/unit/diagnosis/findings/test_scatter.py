@@ -9,7 +9,7 @@ import pytest
 from diagnosis.findings.next_steps import next_steps
 from diagnosis.findings.repeatability import Spread, width_text
 from diagnosis.findings.sections import diagnosis_brief
-from diagnosis.findings.verdict import headline, undecided_words, verdict
+from diagnosis.findings.verdict import headline, verdict
 from tests.support.diagnosis_document import CAUSE, findings_of, scattering_document
 from tests.support.rendered import (
     candidates_table,
@@ -180,7 +180,7 @@ def test_undecided_answers_share_the_scatter(given: Document) -> None:
         "effects": {"wind_speed_scatter": 0.9},
         "channels": {"damping": 0.9, "calibration": 0.9},
     }
-    text = undecided_words(findings_of(given))
+    text = findings_of(given).decision.words("the runs")
     assert "quadratic damping (50 %) or scatter between runs (40 %)." in text
     assert "wind speed scatter" not in text
     assert "With every answer the runs differ from each other by chance: " in verdict(findings_of(given), "")

@@ -21,7 +21,7 @@ from diagnosis.findings.decision import decision
 from diagnosis.findings.head import Head
 from diagnosis.findings.next_run import NextRun
 from diagnosis.findings.next_steps import next_steps
-from diagnosis.findings.verdict import headline, undecided_words
+from diagnosis.findings.verdict import headline
 from diagnosis.settings import Settings
 from identification.show.blocks import Block, Heading, Paragraph, TextTable, lines
 from identification.show.numbers import probability
@@ -80,9 +80,8 @@ def test_a_probability_has_one_form_in_tile_sentence_chart_and_tables(
 ) -> None:
     given = copy.deepcopy(given)
     given["candidates"][0]["probability"] = value
-    assert undecided_words(
-        findings_of(decision([("quadratic_damping", value)], Settings().answer).to_json_dict())
-    ).endswith(f": quadratic damping ({text}).")
+    said = decision([("quadratic_damping", value)], Settings().answer).words("the runs")
+    assert said.endswith(f": quadratic damping ({text}).")
     assert f"{text}; " in Head.of(findings_of(given | {"ambiguous_with": []})).sure
     assert tables.candidates_table(findings_of(given)).rows[0][1] == text
     drawn = tables.candidates_figure(findings_of(given))

@@ -17,7 +17,7 @@ from diagnosis.findings.judgements import Nearly, immaterial, nearly
 from diagnosis.findings.misfit import Misfit
 from diagnosis.findings.next_steps import next_steps, rival_lines
 from diagnosis.findings.sections import diagnosis_brief
-from diagnosis.findings.verdict import headline, undecided_words, verdict
+from diagnosis.findings.verdict import headline, verdict
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.settings import Settings
@@ -227,7 +227,7 @@ def test_an_answer_that_predicts_nothing_is_undecided(predictions, doubt):
     assert found.decided is not bool(doubt)
     assert bool(found.unpredictive) is bool(doubt)
     assert [name for name, _ in found.credible] == ["free_play", "coulomb_friction"]
-    words = undecided_words(findings_of(found.to_json_dict()))
+    words = found.words("the runs")
     assert ("Free play fits best, but" in words) is bool(doubt)
     assert doubt in words
     assert decision((("unknown", 0.9), ("free_play", 0.1)), Settings().answer, predictions).decided
