@@ -141,7 +141,7 @@ def scored(document: Mapping[str, Any], where: str) -> ScoredAnswer:
     given, remedy = dict(document), "answer the set again"
     given.pop("data_sha256", None)
     seconds = given.pop("wall_s", None)
-    if not isinstance(seconds, float | None):
+    if isinstance(seconds, bool) or not isinstance(seconds, float | int | None):
         raise TunnelError("is not an answer (wall_s: not a number of seconds)", where=where, remedy=remedy)
     return ScoredAnswer.of(diagnosis_of(given, where, remedy), seconds)
 
