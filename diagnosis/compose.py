@@ -22,7 +22,8 @@ from diagnosis.findings.averaged_coefficients import (
     in_phase,
     possible_answers,
 )
-from diagnosis.findings.candidates import Candidate, candidates, cause_sizes, inclusion, parameter_errors
+from diagnosis.findings.candidates import Candidate, candidates, inclusion, parameter_errors
+from diagnosis.findings.cause_sizes import cause_sizes
 from diagnosis.findings.closing import Closing, confirmed
 from diagnosis.findings.closure import GapSummary, NoiseSummary
 from diagnosis.findings.coefficients import Coefficients

@@ -1,35 +1,50 @@
-"""The answers with their probabilities and parameters, and the effect of each cause on a swing."""
+"""The answers considered: their probabilities and parameters, in numbers, tables and a figure."""
 
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Final
+from functools import partial
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from diagnosis.answer.held_out import Base
 from diagnosis.answer.linear_theory import move_of_halves, parameter_shift
 from diagnosis.findings.closing import Closing
+from diagnosis.findings.finding import Judged, Picture
+from diagnosis.findings.repeatability import RunRepeatability
+from diagnosis.findings.terms import answer_name, scattering
 from diagnosis.findings.units import own_parameters
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.likelihood.residuals import linear_coefficients, resonance
-from diagnosis.model.parameters import Point
+from diagnosis.likelihood.residuals import linear_coefficients
 from diagnosis.search.prepared import COARSE_STEP, HUM
 from diagnosis.search.random_spectra import LONGEST_BANDWIDTH
 from diagnosis.search.study import Answer, Study
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import GapSettings
-from identification.show.numbers import significant, unit_shown
+from identification.show.blocks import TextTable
+from identification.show.drawing import ACCENT, NARROW, QUIET
+from identification.show.numbers import (
+    estimated,
+    explained,
+    held_out_excess,
+    plain,
+    probability,
+    share,
+    unit_mark,
+)
 from identification.show.quantity import Quantity
-from identification.signal.decay_fit import Reading, fit_run
-from identification.signal.free_decay import Decay
+from identification.show.style import figure, grid, styled
 from tunnel_sim.effects import BetweenRuns, known_effects
-from tunnel_sim.effects.capabilities import Friction
 from tunnel_sim.effects.parameters import ParameterInfo
-from tunnel_sim.files.from_json import from_json_fields
-from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.dimensions import beside
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 UNDETERMINED_FROM: Final = 10.0
 """Ratio of the standard deviation to the value and the typical size of a parameter above which it is not
@@ -54,76 +69,6 @@ class Candidate:
     excess_after: float
     closed: float
     parameters: Mapping[str, Quantity] = field(default_factory=dict)
-
-
-_VISIBLE = 0.005  # least change of a damping ratio that is stated
-_VISIBLE_FREQUENCY = 5e-5  # least relative change of a frequency that is stated
-
-
-@dataclass(frozen=True)
-class CauseSize:
-    """Effect of a cause on three cycles of a swing, by the fitted model with it and without it.
-
-    Args:
-        run: id of the run whose conditions are taken.
-        amplitude: of the release, rad.
-        damping_ratio: with the cause, dimensionless.
-        damping_ratio_without: with every cause but this one, dimensionless.
-        frequency_change: of the natural frequency by the cause, a fraction.
-        zero_change: of the middle of the swing by the cause, in the unit of the readings.
-        reading_change: root mean square of the change of the reading, in its unit.
-        stands: angle from rest within which the cause stops the body for good, rad; 0 where it does not.
-    """
-
-    effect: str
-    run: str
-    amplitude: float
-    damping_ratio: float
-    damping_ratio_without: float
-    frequency_change: float
-    zero_change: float
-    reading_change: float
-    stands: float = 0.0
-
-    def to_json_dict(self) -> dict[str, Any]:
-        """The fields, with the units of angles in their names."""
-        found = dict(vars(self))
-        return found | {"amplitude_rad": found.pop("amplitude"), "stands_rad": found.pop("stands")}
-
-    def words(self, unit: str) -> str:
-        """The effect in a sentence; damping and frequency where they change visibly.
-
-        Args:
-            unit: of the readings.
-
-        Returns:
-            Empty where the simulated run does not show it.
-        """
-        (mark, factor), angle = unit_shown(unit), unit_shown("rad")[1]
-        mark = mark if mark == "°" else f" {mark}"
-        changes = []
-        zeta, without = self.damping_ratio, self.damping_ratio_without
-        if abs(zeta - without) > _VISIBLE * max(abs(zeta), abs(without)):
-            changes.append(f"damping ratio {significant(without, 3)} becomes {significant(zeta, 3)}")
-        if abs(self.frequency_change) > _VISIBLE_FREQUENCY:
-            change = 100.0 * self.frequency_change
-            changes.append(f"frequency {'+' if change > 0.0 else ''}{significant(change, 2)} %")
-        reading = factor * self.reading_change
-        if abs(self.zero_change) > 0.5 * self.reading_change:
-            changes.append(f"the middle moves by {significant(factor * self.zero_change, 2)}{mark}")
-        if not changes and not reading:
-            return ""
-        changes.append(f"the reading changes by {significant(reading, 2)}{mark} root mean square")
-        held = angle * self.stands
-        stands = f"; it stops the body up to {significant(held, 2)}° from rest" if held > 0.0 else ""
-        amplitude = significant(angle * self.amplitude, 2)
-        return f"Over three cycles from {amplitude}°: {', '.join(changes)}{stands}"
-
-    @from_json_fields
-    @staticmethod
-    def _fields(data: Mapping[str, Any]) -> Mapping[str, Any]:
-        """The fields, without units in their names."""
-        return {**data, "amplitude": data["amplitude_rad"], "stands": data["stands_rad"]}
 
 
 def meant_parameter(found: Quantity, info: ParameterInfo, swing: float, undetermined: float) -> Quantity:
@@ -305,91 +250,6 @@ def _parameters(
     return {name.split(".")[1] if single else name: value for name, value in own.items()}
 
 
-_CYCLES = 3.0
-_FEWEST = 10  # block means in them
-_CLOSE = 1e-12  # tolerance of the fit of a curve without noise
-_SHARE = 0.5  # of the largest swing: an amplitude that every run passes through
-
-
-def cause_sizes(study: Study) -> tuple[CauseSize, ...]:
-    """Simulate the fitted model with each cause and without it.
-
-    Returns:
-        The size of every fitted cause, in the measured campaign's units. The simulated runs are free decays, so a
-        cause has none if it was detected in the records, is random, stops the motion at once, acts on driven runs
-        only, or acts on a body without a spring.
-    """
-    fit, data = study.chosen, study.chosen.problem.data.undriven()
-    if not data.model.restored:
-        return ()
-    problem = replace(fit.problem, data=data)
-    reading_unit, amplitude = study.similarity.own(1.0, study.similarity.reading), _SHARE * data.swing
-    sizes = []
-    for kind, effect in zip(problem.effects, problem.effects_at(fit.point.common), strict=True):
-        severity = f"{kind.name}.{kind.parameters()[0].name}"
-        if not data.may_show(kind) or severity not in problem.names:
-            continue
-        acts = np.flatnonzero(data.acts(kind)).tolist()
-        release, without = fit.point.per_run.copy(), fit.point.common.copy()
-        release[:, :2] = amplitude, 0.0
-        without[problem.names.index(severity)] = 0.0
-        both = problem.predict([Point(fit.point.common, release), Point(without, release)])
-        # only some runs show a cause in one spring or one wind
-        shown = [i for i in acts or range(len(data.runs)) if not np.array_equal(both[0][i], both[1][i])]
-        if not shown:
-            continue
-        # the softest spring, on which a moment acts most
-        index = min(shown, key=lambda i: data.runs[i].spring_stiffness or 0.0)
-        run, frequency = data.runs[index], resonance(fit, index)
-        count = min(run.reading.size, round(_CYCLES / (frequency * run.interval)))
-        curves = [readings[index][:count] for readings in both]
-        decay, decay_without = (_decay(run.interval, curve, frequency) for curve in curves)
-        if decay is None or decay_without is None:
-            continue
-        size = CauseSize(
-            effect=kind.name,
-            run=run.id,
-            amplitude=amplitude,
-            damping_ratio=decay[1],
-            damping_ratio_without=decay_without[1],
-            frequency_change=decay[0] / decay_without[0] - 1.0,
-            zero_change=reading_unit * (decay[2] - decay_without[2]),
-            reading_change=reading_unit * float(np.sqrt(np.mean((curves[0] - curves[1]) ** 2))),
-            stands=effect.stands(linear_coefficients(fit, index)[2]) if isinstance(effect, Friction) else 0.0,
-        )
-        sizes.append(size)
-    return tuple(sizes)
-
-
-def damping_ratio(fit: Fit) -> float | None:
-    """The damping ratio of the fitted motion as a whole over three cycles from half of the largest swing.
-
-    Returns:
-        Of the first run; None where its motion there is not a decay.
-    """
-    data = fit.problem.data
-    release = fit.point.per_run.copy()
-    release[:, :2] = _SHARE * data.swing, 0.0
-    run, frequency = data.runs[0], resonance(fit, 0)
-    count = min(run.reading.size, round(_CYCLES / (frequency * run.interval)))
-    decay = _decay(
-        run.interval, fit.problem.predict([Point(fit.point.common, release)])[0][0][:count], frequency
-    )
-    return None if decay is None or decay[1] <= 0.0 else decay[1]
-
-
-def _decay(interval: float, curve: Array, frequency: float) -> tuple[float, float, float] | None:
-    """Angular frequency (rad/s), damping ratio and mean of a few cycles; None where they are not a decay."""
-    if curve.size < _FEWEST or not np.all(np.isfinite(curve)):
-        return None
-    reading = Reading(interval * np.arange(curve.size, dtype=np.float64), curve)
-    found = fit_run(reading, Decay(0.0, (2.0 * np.pi * frequency) ** 2), tolerance=_CLOSE)
-    if not found.runs or found.runs[0].decay.omega_d == 0.0:  # without the cause the body does not swing
-        return None
-    decay = found.runs[0].decay
-    return decay.omega_n, decay.zeta, found.zero
-
-
 def parameter_errors(study: Study, closes: Closing) -> dict[str, float]:
     """Standard deviations of the parameters of the answer beside those of the noise, by ``effect.parameter``.
 
@@ -411,3 +271,128 @@ def parameter_errors(study: Study, closes: Closing) -> dict[str, float]:
             halves = move_of_halves(fit, np.eye(len(problem.names))[place])
             found[name] = math.hypot(float(stepped[place]), halves)
     return found
+
+
+ANSWERS_LISTED: Final = 6
+"""Maximum number of answers in a table. Judgement."""
+ANSWER_LISTED: Final = 0.005
+"""Minimum probability of an answer in a table. Judgement."""
+ANSWER_DRAWN: Final = 0.01
+"""Minimum probability of an answer in the charts of the report. Judgement."""
+
+
+def ranked(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """The answers of a document, the most probable first.
+
+    The document starts with its answer. If undecided, that is the most probable set of effects, and an unknown
+    cause may be more probable.
+    """
+    return sorted(candidates, key=lambda one: -one.probability)
+
+
+def candidates_table(
+    candidates: Sequence[Candidate], repeated: RunRepeatability, judged: Judged
+) -> TextTable:
+    """The answers considered and their shares of the gap, most probable first; a last row counts the others."""
+    rows, given = [], ranked(candidates)
+    probable = [c for c in given[:ANSWERS_LISTED] if c.probability >= ANSWER_LISTED]
+    shown = probable or given[:1]
+    for candidate in shown:
+        fitted = candidate.effect not in ("none", "unknown")
+        closed = share(candidate.closed) if fitted else "–"
+        name = answer_name(candidate.effect).replace(" + ", " +\n")
+        parameters = "\n".join(
+            f"{plain(full).replace('.', ': ')} = {_estimate(repeated, full, candidate.effect, given)}"
+            for full, given in candidate.parameters.items()
+        )
+        excess = held_out_excess(candidate.excess_after)
+        rows.append((name, probability(candidate.probability), closed, excess, parameters))
+    if others := given[len(shown) :]:
+        together = sum(candidate.probability for candidate in others)
+        rows.append((f"{len(others)} more, together", probability(together), "", "", ""))
+    detail = ("residual [× noise variance]", "parameters")
+    heads = ("answer", "probability", "explained in the fit", *detail)
+    return TextTable(
+        f"Answers for {judged.campaign}",
+        heads,
+        tuple(rows),
+        heads[1:4],
+        names=("answer",),
+        detail=detail,
+    )
+
+
+def _estimate(repeated: RunRepeatability, full: str, candidate: str, given: Quantity) -> str:
+    """A parameter of an answer, by its full name."""
+    mark = unit_mark(beside(given.unit, ""))
+    return repeated.spread_estimate(full.rpartition(".")[0] or candidate, given) or estimated(given, mark)
+
+
+def parameters_table(first: Candidate, repeated: RunRepeatability, judged: Judged) -> TextTable:
+    """The parameters of the answer; a table without rows where it has none."""
+    rows, effect = [], ""
+    for full, given in first.parameters.items():
+        owner, _, name = full.rpartition(".")
+        owner = owner or first.effect
+        size = _estimate(repeated, full, first.effect, given)
+        rows.append((owner if owner != effect else "", name, size))
+        effect = owner
+    whose = "Parameters" if judged.decided else f"Parameters of the {judged.set_out}"
+    units = explained({given.unit for given in first.parameters.values()})
+    heads = ("effect", "parameter", "estimate")
+    return TextTable(f"{whose} ± one standard deviation{units}", heads, tuple(rows), names=heads[:2])
+
+
+def inclusion_line(inclusion: Mapping[str, float], least: float) -> str:
+    """The effects that may be among the causes, most probable first; empty where none is probable enough.
+
+    Args:
+        inclusion: by effect, the probability that it is among the causes.
+        least: probability of an effect that is listed.
+    """
+    likely = dict(sorted(inclusion.items(), key=lambda item: -item[1]))
+    names = [name for name, value in likely.items() if value >= least]
+    last = scattering(names)  # scatter is common to every answer
+    ordered = [*(name for name in names if name not in last), *last]
+    shown = [f"{plain(name)} {probability(likely[name])}" for name in ordered]
+    return f"Among the causes, with probability: {', '.join(shown)}." if shown else ""
+
+
+SHOWN = 8
+"""Most answers drawn."""
+
+
+_LABEL = 24  # characters in a line of a label
+
+
+def candidates_pictures(candidates: Sequence[Candidate]) -> tuple[Picture, ...]:
+    """The likely answers."""
+    drawn = Picture(
+        "which",
+        "Probability of the likely answers. The possible answers are: no gap, every fitted set of effects, and "
+        "unknown.",
+        "Bars: probability of each answer.",
+        partial(candidates_figure, candidates),
+    )
+    return (drawn,)
+
+
+@styled
+def candidates_figure(candidates: Sequence[Candidate]) -> Figure | None:
+    """The answers that are not improbable; None for fewer than two, where words suffice."""
+    shown = [c for c in ranked(candidates)[:SHOWN] if c.probability >= ANSWER_DRAWN]
+    if len(shown) < 2:
+        return None
+    names = [textwrap.fill(plain(answer_name(candidate.effect)), _LABEL) for candidate in shown]
+    fig = figure(NARROW, 0.7 + 0.3 * len(shown) + 0.15 * sum(name.count("\n") for name in names))
+    axes = fig.add_subplot()
+    values = [candidate.probability for candidate in shown]
+    colours = [ACCENT if candidate is candidates[0] else QUIET for candidate in shown]
+    axes.barh(range(len(shown)), values, color=colours, height=0.6)
+    for index, value in enumerate(values):
+        axes.text(value + 0.01, index, probability(value), va="center")
+    axes.set_yticks(range(len(shown)), names)
+    axes.invert_yaxis()
+    axes.set(xlim=(0.0, 1.12), xticks=np.linspace(0.0, 1.0, 6), xlabel="probability")
+    grid(axes, "x")
+    return fig

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from scipy.special import ndtr, ndtri
 
-from diagnosis.findings.candidates import damping_ratio
+from diagnosis.findings.cause_sizes import damping_ratio
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import linear_coefficients
 from diagnosis.search.study import Study

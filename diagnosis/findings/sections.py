@@ -9,7 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Final
 
-from diagnosis.findings.answers import candidates_pictures, candidates_table, inclusion_line, parameters_table
+from diagnosis.findings.candidates import (
+    candidates_pictures,
+    candidates_table,
+    inclusion_line,
+    parameters_table,
+)
 from diagnosis.findings.cards import cause_cards, effect_cards
 from diagnosis.findings.closure import (
     closure_pictures,

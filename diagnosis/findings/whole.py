@@ -11,8 +11,8 @@ from typing import Annotated, Any, Self, cast, get_args, get_type_hints
 from pydantic import TypeAdapter
 
 from diagnosis.answer.held_out import Waterfall
-from diagnosis.findings.answers import candidates_pictures
-from diagnosis.findings.candidates import Candidate, CauseSize
+from diagnosis.findings.candidates import Candidate, candidates_pictures
+from diagnosis.findings.cause_sizes import CauseSize
 from diagnosis.findings.causes import NamedCauses
 from diagnosis.findings.closure import (
     Confirmation,

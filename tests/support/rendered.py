@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from diagnosis.findings import answers, closure, coefficients, place, remainder, symbols
+from diagnosis.findings import candidates, closure, coefficients, place, remainder, symbols
 from diagnosis.findings.sections import EFFECT_LISTED
 from diagnosis.findings.whole import Findings
 from identification.show.blocks import TextTable
@@ -17,15 +17,15 @@ TESTS, SOURCES = closure.TESTS, coefficients.SOURCES
 
 
 def candidates_table(answer: Findings) -> TextTable:
-    return answers.candidates_table(answer.candidates, answer.repeated, answer)
+    return candidates.candidates_table(answer.candidates, answer.repeated, answer)
 
 
 def parameters_table(answer: Findings) -> TextTable:
-    return answers.parameters_table(answer.candidates[0], answer.repeated, answer)
+    return candidates.parameters_table(answer.candidates[0], answer.repeated, answer)
 
 
 def inclusion_line(answer: Findings) -> str:
-    return answers.inclusion_line(answer.inclusion, EFFECT_LISTED)
+    return candidates.inclusion_line(answer.inclusion, EFFECT_LISTED)
 
 
 def symbol_rows(answer: Findings) -> list[tuple[str, str]]:

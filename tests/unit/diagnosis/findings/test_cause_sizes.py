@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.findings.candidates import CauseSize, cause_sizes
+from diagnosis.findings.cause_sizes import CauseSize, cause_sizes
 from diagnosis.likelihood.least_squares import Fit, fit
 from diagnosis.likelihood.residuals import linear_coefficients
 from diagnosis.likelihood.starting_points import starting_points

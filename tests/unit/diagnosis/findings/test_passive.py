@@ -8,7 +8,7 @@ from scipy.stats import truncnorm
 
 from diagnosis.answer.held_out import one_more
 from diagnosis.findings.averaged_coefficients import coefficients, possible_answers
-from diagnosis.findings.candidates import damping_ratio
+from diagnosis.findings.cause_sizes import damping_ratio
 from diagnosis.findings.passive import truncated, within_bounds
 from diagnosis.findings.trade_off import least_separated
 from diagnosis.likelihood.least_squares import fit_at
