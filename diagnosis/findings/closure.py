@@ -197,9 +197,10 @@ def waterfall_table(waterfall: Waterfall, misfit: Misfit) -> TextTable:
     steps, without = waterfall.steps, waterfall.without
     rows = []
     for step in steps if len(steps) > 1 else ():
-        alone = step.effect and step.effect in without and misfit.words(without[step.effect], times=True)
+        alone = without.get(step.effect or "")
+        cell = "" if alone is None else misfit.words(alone, times=True)
         name = answer_name(step.effect) if step.effect else "without the causes"
-        rows.append((name, misfit.words(step.excess, times=True), alone or ""))
+        rows.append((name, misfit.words(step.excess, times=True), cell))
     title = f"Gap {waterfall.held_out} as the causes are added, {_IN_BRACKETS}"
     heads = ("cause added", "residual gap", "without this cause")
     return TextTable(title, heads, tuple(rows), heads[1:], names=heads[:1])
