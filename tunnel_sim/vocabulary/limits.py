@@ -23,7 +23,7 @@ WEIGHTS_BYTES = 64 * 2**20
 MODEL_BYTES = 16 * 2**20
 """Most XML of a model of one's own, bytes: MJCF with its vertices in the text takes a few MB."""
 ASSET_BYTES = 128 * 2**20
-"""Most meshes, height fields and images of a model together, bytes: those of a whole robot take 50 MB."""
+"""Most meshes, height fields and images of a model together, bytes: a whole robot takes 50 MB."""
 UPLOAD_BYTES = 128 * 2**20
 """Most bytes dropped on the bench at once: they pass through memory; tunnel import reads larger files."""
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
+from diagnosis.result import Diagnosis
 from tests.support.command import Tunnel
+from tests.support.diagnosis_document import findings_of
 from tests.support.own_effects import EFFECTS_FILE
 from tunnel_lab.experiments.blind import answers as answer
 from tunnel_sim.effects import Effect, effect_class
@@ -78,11 +79,10 @@ def test_a_blind_set_is_answered_and_scored_with_them(
     """An open set of one campaign: the fits are replaced, the truth is what was planted."""
     known: list[set[str]] = []
 
-    def diagnose(_: Campaign, kinds: Sequence[type[Effect]]) -> SimpleNamespace:
+    def diagnose(_: Campaign, kinds: Sequence[type[Effect]]) -> Diagnosis:
         known.append({kind.name for kind in kinds})
-        document = {"causes": [effect_class("detent").name], "gap": {"closed": 0.99}}
-        document["candidates"] = [{"effect": "detent", "probability": 0.9}]
-        return SimpleNamespace(to_json_dict=lambda: document)
+        found = {"causes": [effect_class("detent").name], "gap": {"closed": 0.99}}
+        return findings_of({**found, "candidates": [{"effect": "detent", "probability": 0.9}]})
 
     monkeypatch.setattr(answer, "diagnose", diagnose)
     given = ("--effects-file", effects_file)
