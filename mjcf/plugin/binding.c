@@ -112,13 +112,41 @@ static mjtNum drive_at(const mjModel* m, const vwt_ids* self, const vwt_state* s
   return m->numeric_data[m->numeric_adr[self->drive] + (int)mju_clip(at, 0, last)];
 }
 
+// Moments on the joint that the law does not have, N m.
+typedef struct {
+  mjtNum applied;  // of the model's actuators and of the user, which are a load
+  mjtNum other;    // of gravity, and of MuJoCo's passive forces beyond the linear spring and damper
+} vwt_engine;
+
+// Those on which friction depends. MuJoCo computes gravity's moment and those of the actuators after the passive forces:
+// they are computed here too, since each stage of a step has its own.
+static vwt_engine engine_moments(const mjModel* m, mjData* d, const vwt_ids* self, const vwt_parameters* p,
+                                 const vwt_motion* now) {
+  const int dof = self->dof;
+  vwt_engine found = {d->qfrc_applied[dof], 0};
+  if (!vwt_rubs(p)) {
+    return found;
+  }
+  if (m->nu > 0) {
+    mj_fwdActuation(m, d);
+    found.applied += d->qfrc_actuator[dof];
+  }
+  mj_markStack(d);
+  mjtNum* bias = mj_stackAllocNum(d, m->nv);
+  mj_rne(m, d, 0, bias);
+  found.other = d->qfrc_spring[dof] + p->spring_stiffness * now->angle + d->qfrc_damper[dof] +
+                p->mechanical_damping * now->rate + d->qfrc_gravcomp[dof] + d->qfrc_fluid[dof] - bias[dof];
+  mj_freeStack(d);
+  return found;
+}
+
 static vwt_moments moments_at(const mjModel* m, const mjData* d, const vwt_ids* self, const vwt_parameters* p,
-                              const vwt_state* state, const vwt_motion* at) {
+                              const vwt_state* state, const vwt_motion* at, vwt_engine engine) {
   const mjtNum drive = self->drive < 0 ? 0 : drive_at(m, self, state, at->time);
   const int on_end = given(m, self->drive_on_end);
   const mjtNum root = on_end && drive != 0 && p->spring_stiffness > 0 ? drive / p->spring_stiffness : 0;
   vwt_moments law = {air_moment(m, d, self, p, state, at), mechanism_moment(m, d, self, p, at, root),
-                     vwt_load(p, at->angle, on_end ? 0 : drive)};
+                     vwt_load(p, at->angle, engine.applied + (on_end ? 0 : drive)), engine.applied + engine.other};
   if (self->drive >= 0) {
     *(on_end ? &law.mechanism : &law.air) += drive;
   }
@@ -156,7 +184,7 @@ static mjtNum deflection_at(const vwt_state* state, mjtNum range, const vwt_moti
 // Coefficients may change between calls that do not step, but the time does not.
 static vwt_moments moments_at_start(const mjModel* m, const mjData* d, vwt_instance* instance, const vwt_parameters* p,
                                     const vwt_state* state, const vwt_motion* start, const vwt_motion* now,
-                                    vwt_moments present) {
+                                    vwt_moments present, vwt_engine engine) {
   if (memcmp(start, now, sizeof(*now)) == 0) {
     instance->started = 1;
     instance->start = *start;
@@ -166,11 +194,11 @@ static vwt_moments moments_at_start(const mjModel* m, const mjData* d, vwt_insta
   if (instance->started && now->time > start->time && memcmp(start, &instance->start, sizeof(*start)) == 0) {
     return instance->start_moments;
   }
-  return moments_at(m, d, &instance->ids, p, state, start);
+  return moments_at(m, d, &instance->ids, p, state, start, engine);
 }
 
 static mjtNum friction(const mjModel* m, const mjData* d, vwt_instance* instance, const vwt_parameters* p,
-                       const vwt_state* state, const vwt_motion* now, vwt_moments present) {
+                       const vwt_state* state, const vwt_motion* now, vwt_moments present, vwt_engine engine) {
   const vwt_ids* self = &instance->ids;
   const mjtNum inertia = end_inertia(m, d, self, p);
   if (p->presliding > 0) {
@@ -179,9 +207,8 @@ static mjtNum friction(const mjModel* m, const mjData* d, vwt_instance* instance
     return -deflection_at(state, range, now) / range * vwt_friction_level(p, least, fabs(now->rate), present.load);
   }
   const vwt_motion start = start_motion(state, now);
-  const mjtNum applied = d->qfrc_applied[self->dof];  // by the user, on the rod's upper end
-  const vwt_moments law = moments_at_start(m, d, instance, p, state, &start, now, present);
-  const mjtNum other = other_moment(m, self, p, law, &start) + applied;
+  const vwt_moments law = moments_at_start(m, d, instance, p, state, &start, now, present, engine);
+  const mjtNum other = other_moment(m, self, p, law, &start) + law.engine;
   return vwt_friction_moment(p, inertia, start.rate, other, law.load, m->opt.timestep, now->rate, present.load);
 }
 
@@ -190,10 +217,11 @@ void vwt_apply_moments(const mjModel* m, mjData* d, vwt_instance* instance, cons
   vwt_parameters p;
   read_parameters(m, d, self, &p);
   const vwt_motion now = present_motion(m, d, self);
-  const vwt_moments law = moments_at(m, d, self, &p, state, &now);
+  const vwt_engine engine = engine_moments(m, d, self, &p, &now);
+  const vwt_moments law = moments_at(m, d, self, &p, state, &now, engine);
   mjtNum mechanism = law.mechanism;
   if (vwt_rubs(&p)) {
-    mechanism += friction(m, d, instance, &p, state, &now, law);
+    mechanism += friction(m, d, instance, &p, state, &now, law, engine);
   }
   d->qfrc_passive[self->dof] += law.air + mechanism;
   if (self->twist_dof >= 0) {

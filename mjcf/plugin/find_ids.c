@@ -8,15 +8,16 @@
 
 static int find_numeric(const mjModel* m, const char* name) { return mj_name2id(m, mjOBJ_NUMERIC, name); }
 
-// id of the hinge named by an attribute, -1 where the attribute is empty
-static int find_hinge(const mjModel* m, int instance, const char* attribute) {
+// id of the joint named by an attribute, a hinge or, where it may be, a slide; -1 where the attribute is empty
+static int find_joint(const mjModel* m, int instance, const char* attribute, int may_slide) {
   const char* name = mj_getPluginConfig(m, instance, attribute);
   if (!name || !*name) {
     return -1;
   }
   const int joint = mj_name2id(m, mjOBJ_JOINT, name);
-  if (joint < 0 || m->jnt_type[joint] != mjJNT_HINGE) {
-    mju_error("vwt.yaw_moment: %s=\"%s\" names no hinge of the model", attribute, name);
+  const int type = joint < 0 ? mjJNT_FREE : m->jnt_type[joint];
+  if (type != mjJNT_HINGE && !(may_slide && type == mjJNT_SLIDE)) {
+    mju_error("vwt.yaw_moment: %s=\"%s\" names no hinge%s of the model", attribute, name, may_slide ? " or slide" : "");
   }
   return joint;
 }
@@ -145,11 +146,11 @@ static void find_program(const mjModel* m, vwt_ids* self) {
 }
 
 static void find_joints(const mjModel* m, int instance, vwt_ids* self) {
-  self->joint = find_hinge(m, instance, "joint");
+  self->joint = find_joint(m, instance, "joint", 1);
   if (self->joint < 0) {
     mju_error("vwt.yaw_moment: attribute joint is missing; name the hinge in yaw");
   }
-  self->twist_joint = find_hinge(m, instance, "twist_joint");
+  self->twist_joint = find_joint(m, instance, "twist_joint", 0);
   if (self->twist_joint == self->joint) {
     mju_error("vwt.yaw_moment: twist_joint is the same hinge as joint; name the hinge of the rod's twist");
   }

@@ -28,8 +28,8 @@ static int same_sizes(const vwt_sizes* kept, const mjModel* m) {
 #undef X
 }
 
-static int same_hinge(const mjModel* m, int joint, int dof, int name) {
-  return joint < 0 || (m->jnt_type[joint] == mjJNT_HINGE && m->jnt_dofadr[joint] == dof && m->name_jntadr[joint] == name);
+static int same_joint(const mjModel* m, int joint, int dof, int name) {
+  return joint < 0 || (m->jnt_type[joint] >= mjJNT_SLIDE && m->jnt_dofadr[joint] == dof && m->name_jntadr[joint] == name);
 }
 
 static int name_of(const mjModel* m, int joint) { return joint < 0 ? -1 : m->name_jntadr[joint]; }
@@ -52,8 +52,8 @@ static int holds(const vwt_instance* self, const mjModel* m, int instance) {
   const vwt_ids* ids = &self->ids;
   return same_sizes(&self->size, m) && m->name_numericadr[0] == self->numeric_names &&
          m->plugin_attradr[instance] == self->attributes &&
-         same_hinge(m, ids->joint, ids->dof, self->joint_name) &&
-         same_hinge(m, ids->twist_joint, ids->twist_dof, self->twist_joint_name) && same_spans(m, ids) &&
+         same_joint(m, ids->joint, ids->dof, self->joint_name) &&
+         same_joint(m, ids->twist_joint, ids->twist_dof, self->twist_joint_name) && same_spans(m, ids) &&
          memcmp(m->names, self->text, m->nnames) == 0 &&
          memcmp(m->plugin_attr, self->text + m->nnames, m->npluginattr) == 0;
 }

@@ -47,9 +47,9 @@ typedef struct {
 } vwt_motion;
 
 // The moments of the law, the drive and the surroundings except friction, N m: on the body, and on the rod's upper end;
-// and what the joint carries, on which friction may depend.
+// what the joint carries, on which friction may depend; and the moments that the law does not have.
 typedef struct {
-  double air, mechanism, load;
+  double air, mechanism, load, engine;
 } vwt_moments;
 
 typedef struct {
