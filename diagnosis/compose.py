@@ -373,7 +373,7 @@ def _predictions(
         held_out=gap.closed,
         ahead=gap.closed_ahead,
         patched=None if patched is None else patched.judged(chosen),
-        untested=None if patched is None else patched.untested(chosen),
+        under_load=None if patched is None else patched.under_load(chosen),
         left=gap.misfit.of_swing(gap.excess_after),
         elsewhere=isinstance(place, PlaceFound) and place.elsewhere,
     )

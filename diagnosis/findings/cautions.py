@@ -211,10 +211,8 @@ PATCH: Mapping[str, Sentence] = {
     "mujoco.mj_initCtrlHistory(model, data, {index}, None, numpy.full(({samples}, 1), data.ctrl[{index}])).",
     "soft friction": "frictionloss is a soft constraint: below {below_per_s:.2g} {unit}/s it acts as a damper, "
     "and a joint at rest by friction creeps. Its time constant is set to two steps, the shortest allowed.",
-    "friction against rate": "The dependence of the friction on the rate is left out: it has no native element, "
-    "and the plugin acts on hinges only.",
     "friction against load": "The friction that depends on the load of the joint is written as its mean over the "
-    "travel: it has no native element, and the plugin supports only gravity's moment on a hinge.",
+    "travel: it has no native element.",
     "rod": "The twist of the rod is left out: it needs a further body and joint.",
     "delayed input": "The delay of the input is not part of the model; the comparison applies it to the input.",
     "actuator": "The actuator is not part of the model; the comparison applies its effect to the input.",

@@ -30,7 +30,7 @@ class Doubt:
     """A prediction by which a probable answer fails.
 
     Args:
-        kind: ``held out``, ``ahead``, ``patched``, ``untested``, ``left`` or ``elsewhere``, as in `Predictions`.
+        kind: ``held out``, ``ahead``, ``patched``, ``under load``, ``left`` or ``elsewhere``, as in `Predictions`.
         share: that was found, a fraction; None where the place is in doubt.
     """
 
@@ -53,8 +53,8 @@ _DOUBTS: Mapping[str, Callable[[float], str]] = {
         f"{_little(found)} of the gap in the later half of the runs, fitted to the earlier"
     ),
     "patched": lambda found: f"{_little(found)} of the gap when written into the model and simulated",
-    "untested": lambda found: (
-        f"leaves {share(found)} of the gap, and the model can have only the mean of its friction under load"
+    "under load": lambda found: (
+        f"leaves {share(found)} of the gap, as friction under load does where it follows another law"
     ),
     "left": lambda found: f"leaves a residual of {share(found)} of the swing",
     "elsewhere": lambda _: "the residuals point elsewhere",
@@ -70,7 +70,7 @@ class Predictions:
         held_out: share of the gap that it explains on held-out readings.
         ahead: share of the gap in the later half of driven runs that it explains, fitted to the earlier half.
         patched: share of the gap that the user's model explains, with the answer written into it.
-        untested: share of the gap that the fit leaves, where the user's model can have only a mean of a cause.
+        under_load: share of the gap that friction under the load of an actuator leaves.
         left: root mean square residual over that of the readings about their mean, a ratio.
         elsewhere: whether the residuals show a place at which none of its causes acts.
     """
@@ -78,7 +78,7 @@ class Predictions:
     held_out: float | None = None
     ahead: float | None = None
     patched: float | None = None
-    untested: float | None = None
+    under_load: float | None = None
     left: float | None = None
     elsewhere: bool = False
 
@@ -90,8 +90,8 @@ class Predictions:
             for kind, explained in shares.items()
             if explained is not None and explained < PREDICTED_FROM
         ]
-        if self.untested is not None:
-            found.append(Doubt("untested", self.untested))
+        if self.under_load is not None:
+            found.append(Doubt("under load", self.under_load))
         if self.left is not None and self.left > LEFT_OF_SWING:
             found.append(Doubt("left", self.left))
         if self.elsewhere:

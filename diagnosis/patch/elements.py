@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self, TypeVar
 
@@ -20,6 +20,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 
 # the plugin wants them
 _AIR = ("air_density", "wind_speed", "frontal_area", "reference_length", "cn_beta", "cn_r")
+_PLUGIN = "vwt.yaw_moment"
 _NO_MOTOR = 1e-9  # N m/A: of a motor that is a friction alone; MuJoCo wants more than 0
 _STIFF_STEPS = 2.0  # time constant of frictionloss in steps: the shortest that MuJoCo accepts
 
@@ -197,44 +198,54 @@ class DryFriction(NativeElement):
     """The whole dry friction of the joint.
 
     Args:
-        moment: N m.
+        moment: of the plugin's own friction the greatest, N m.
         presliding: deflection at which its contact slides, rad; 0: none.
+        own: numerics of the plugin's own friction, by name, N m and rad/s; empty: the friction is MuJoCo's.
     """
 
     moment: float
     presliding: float = 0.0
+    own: tuple[tuple[str, float], ...] = ()
 
     @classmethod
     def fit(cls, law: FittedLaw) -> Self:
-        """The sliding friction and its range."""
-        return cls(law.own(law.moments.loss, "N m"), law.own(law.moments.presliding, "rad"))
+        """The friction and its range, angles as positions of the joint."""
+        moments, numerics = law.moments, dict[str, float]()
+        for name, size, unit in moments.contact:
+            numerics[name] = law.own(size, unit) + (law.rest if name == "load_angle" else 0.0)
+        if power := numerics.get("friction_exponent"):  # of rates in the campaign's own time
+            numerics["friction_moment"] *= law.own(1.0, "rad/s") ** -power
+        return cls(law.own(moments.loss, "N m"), law.own(moments.presliding, "rad"), tuple(numerics.items()))
 
     def write(self, into: Into) -> Into:
-        """Friction as ``frictionloss``, or with presliding as that of a motor without a control.
+        """Friction as ``frictionloss``, with presliding as that of a motor without a control, or as the plugin's.
 
         MuJoCo has LuGre's friction in motors alone. Without a damping of its own and a rise near rest it is Dahl's.
         The deflection has a lower limit, so that the oscillation of the contact is stable with the model's steps.
         """
         joint, step = into.joint, into.spec.option.timestep
-        joint.frictionloss = self.moment if self.presliding == 0.0 else 0.0
+        rigid = self.presliding == 0.0 and not self.own
+        joint.frictionloss = self.moment if rigid else 0.0
         if joint.frictionloss != into.before.dof_frictionloss[0]:
             joint.solref_friction = (_STIFF_STEPS * step, 1.0)
-        if self.presliding == 0.0 or self.moment == 0.0:
+        least = self.moment * step**2 / (2.0 * into.inertia)
+        presliding = max(self.presliding, least) if self.presliding else 0.0
+        if self.own:
+            return with_plugin(into, {**dict(self.own), "presliding": presliding})
+        if rigid or self.moment == 0.0:
             return into
         actuator, name = into.spec.add_actuator(), into.given.joint
         actuator.name = f"{name}_friction"
         actuator.trntype, actuator.target = mujoco.mjtTrn.mjTRN_JOINT, name
-        least = self.moment * step**2 / (2.0 * into.inertia)
-        stiffness = self.moment / max(self.presliding, least)
         actuator.set_to_dcmotor(
             motorconst=(_NO_MOTOR, _NO_MOTOR), resistance=1.0, ctrlspec=int(mujoco.mjtCtrlInput.mjINPUT_NONE),
-            lugre=(stiffness, 0.0, self.moment, self.moment, 1.0),
+            lugre=(self.moment / presliding, 0.0, self.moment, self.moment, 1.0),
         )  # fmt: skip
         return replace(into, states=into.states + 1)
 
     def limits(self, model: mujoco.MjModel, rest: float, *, slide: bool) -> tuple[Fact, ...]:
         """The rate up to which ``frictionloss`` yields as a damper."""
-        soft = self.moment > 0.0 and self.presliding == 0.0
+        soft = self.moment > 0.0 and self.presliding == 0.0 and not self.own
         creep = creep_rate(model, rest) if soft else 0.0
         return (
             (Fact("soft friction", {"below_per_s": creep, "unit": "m" if slide else "rad"}),)
@@ -342,56 +353,53 @@ class ServoGain(NativeElement):
         return into
 
 
+def with_plugin(into: Into, numerics: Mapping[str, float | Sequence[float]]) -> Into:
+    """The plugin with further numerics."""
+    spec = into.spec
+    if all(one.plugin_name != _PLUGIN for one in spec.plugins):
+        plugin = spec.add_plugin(name="tunnel", plugin_name=_PLUGIN, active=True)
+        plugin.config = {"joint": into.given.joint}
+        spec.activate_plugin(_PLUGIN)
+        numerics = {**dict.fromkeys(_AIR, 0.0), **numerics}
+    for name, value in numerics.items():
+        data = np.ravel(value).tolist()
+        spec.add_numeric(name=name, data=data, size=len(data))
+    return into
+
+
 @dataclass(frozen=True)
 class PluginMoment(NativeElement):
-    """Moments of the plugin, which MuJoCo's own elements do not have.
+    """A moment of the plugin, which MuJoCo's own elements do not have.
 
     Args:
-        program: of a further moment (``mjcf/plugin/expression.h``), in the joint's position; empty: none.
-        contact: numerics of the plugin's own friction, by name, N m and rad; empty: none.
+        program: of the moment (``mjcf/plugin/expression.h``), in the joint's position.
     """
 
-    program: tuple[float, ...] = ()
-    contact: tuple[tuple[str, float], ...] = ()
+    program: tuple[float, ...]
 
     @classmethod
     def fit(cls, law: FittedLaw) -> Self | None:
         """The program in terms of the model's joint: its position, rate, time and moment."""
-        moments, rest = law.moments, law.rest
-        if not (moments.program or moments.contact):
+        if not law.moments.program:
             return None
         value, times = operation("number"), operation("multiply")
         replaced = {
-            operation("angle"): (value, rest, operation("subtract")),
+            operation("angle"): (value, law.rest, operation("subtract")),
             operation("rate"): (value, 1.0 / law.own(1.0, "rad/s"), times),
             operation("time"): (value, 1.0 / law.own(1.0, "s"), times),
         }
         code: list[float] = []
-        given = iter(moments.program)
+        given = iter(law.moments.program)
         for one in given:
             code.append(one)
             if one == value:
                 code.append(next(given))
             code += replaced.get(one, ())
-        contact = tuple(
-            (name, law.own(size, unit) + (rest if name == "load_angle" else 0.0))
-            for name, size, unit in moments.contact
-        )
-        return cls((*code, value, law.own(1.0, "N m"), times) if code else (), contact)
+        return cls((*code, value, law.own(1.0, "N m"), times))
 
     def write(self, into: Into) -> Into:
-        """The plugin with its numerics."""
-        spec, given = into.spec, into.given
-        if given.law.slide:
-            raise TunnelError("the plugin acts on hinges only", remedy="leave out --patch")
-        plugin = spec.add_plugin(name="tunnel", plugin_name="vwt.yaw_moment", active=True)
-        plugin.config = {"joint": given.joint}
-        spec.activate_plugin("vwt.yaw_moment")
-        for name, value in (*((name, 0.0) for name in _AIR), *self.contact):
-            spec.add_numeric(name=name, data=[value], size=1)
-        if self.program:
-            spec.add_numeric(name="moment_program", data=list(self.program), size=len(self.program))
-        return into
+        """The plugin with the program."""
+        return with_plugin(into, {"moment_program": self.program})
 
 
 @dataclass(frozen=True)
@@ -453,7 +461,8 @@ class FoundLaw:
     @property
     def by_plugin(self) -> bool:
         """Whether MuJoCo's own elements do not suffice."""
-        return self.element(PluginMoment) is not None
+        friction = self.element(DryFriction)
+        return self.element(PluginMoment) is not None or (friction is not None and bool(friction.own))
 
 
 def _unwritten(law: FittedLaw, elements: Sequence[NativeElement]) -> tuple[Fact, ...]:

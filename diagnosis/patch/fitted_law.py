@@ -116,7 +116,6 @@ class FittedLaw:
             drive = problem.chain(self.common, self.release, run).physics().drive
             moment = np.zeros(run.reading.size)
             if drive is not None and drive.kind.by_actuator:
-                acting = drive.acting
-                moment = acting.scale * np.interp(run.times - acting.delay, acting.time_s, acting.values)
+                moment = drive.at(run.times)
             found.append((run.reading - zero, moment))
         return found

@@ -1,42 +1,38 @@
-"""Friction of any form in MuJoCo: its own elements as far as they apply, and the plugin for the rest."""
+"""Friction of any form in MuJoCo: its own elements as far as they apply, and the plugin's friction for the rest."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from diagnosis.model.fact import Fact
 from diagnosis.patch.native_moments import NativeMoments, by_plugin, nearest_polynomial
-from tunnel_sim.effects.friction_laws import AGAINST_RATE, friction_of
-from tunnel_sim.physics.expression import parse
-from tunnel_sim.physics.moment_law import WEIGHTS
+from tunnel_sim.effects.friction_laws import AGAINST_RATE, CONTACT, friction_of
+from tunnel_sim.physics.moment_law import WEIGHTS, parameter_units
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import JointLaw
 
-_AGAINST_RATE = "friction's dependence on the rate"
-_AGAINST_LOAD = "friction's dependence on gravity's moment"
-_LOAD = "-sign(r)*mu*abs(K*sin(b-k))"
-_FACTORS = {  # on the friction, by the term of the moment law
-    "friction_exponent": "(abs(r)/2)^n",
-    "friction_saturation": "tanh(abs(r)/v0)",
-    "friction_peak": "(1+b*exp(-(r/vs)^2))",
-}
-_SYMBOLS = {"n": "exponent", "v0": "saturation", "b": "peak", "vs": "peak_rate"}
+#: What friction depends on, in the words of the facts that the plugin adds it.
+ON_RATE = "friction's dependence on the rate"
+ON_GRAVITY = "friction's dependence on gravity's moment"
+ON_ACTUATOR = "friction's dependence on the actuator's moment"
 
 
 @dataclass(frozen=True)
 class Carried:
-    """The load that a joint carries: means over the distance travelled in the runs.
+    """The load that a joint carries in the runs: the greater of gravity's moment and an actuator's.
 
     Args:
-        whole: the greater of gravity's moment and an actuator's, N m.
-        beyond: its excess over gravity's, N m.
+        mean: over the distance travelled, N m.
+        greatest: N m.
+        by_actuator: whether an actuator's moment exceeds gravity's anywhere.
     """
 
-    whole: float = 0.0
-    beyond: float = 0.0
+    mean: float = 0.0
+    greatest: float = 0.0
+    by_actuator: bool = False
 
     @classmethod
     def over(cls, parameters: Mapping[str, float], runs: Sequence[tuple[Array, Array]]) -> Carried:
@@ -47,15 +43,11 @@ class Carried:
             runs: angle from rest, rad, and moment of an actuator, N m, each of shape (n,).
         """
         size, rest = _weight(parameters)
-        gravity, driven, travel = [], [], []
-        for angle, moment in runs:
-            gravity.append(np.abs(size * np.sin(angle - rest)))
-            driven.append(np.abs(moment))
-            travel.append(np.abs(np.gradient(angle)))
-        weight, share = np.concatenate(gravity), np.concatenate(travel)
-        whole = np.maximum(weight, np.concatenate(driven))
-        share /= max(float(share.sum()), 1e-300)
-        return cls(float(share @ whole), float(share @ (whole - weight)))
+        angles, moments = ([run[i] for run in runs] for i in (0, 1))
+        weight, driven = np.abs(size * np.sin(np.concatenate(angles) - rest)), np.abs(np.concatenate(moments))
+        travel = np.concatenate([np.abs(np.gradient(angle)) for angle in angles])
+        load, whole = np.maximum(weight, driven), max(float(travel.sum()), 1e-300)
+        return cls(float(travel @ load) / whole, float(np.max(load)), bool(np.any(driven > weight)))
 
 
 def _weight(parameters: Mapping[str, float]) -> tuple[float, float]:
@@ -77,9 +69,8 @@ def native_friction(
 
     Presliding friction is that of a ``dcmotor`` without a control (``lugre``), which is Dahl's where it has no
     damping of its own. Friction that depends on the rate becomes ``frictionloss`` and the joint's polynomial
-    damping where their error is within the allowance. Else ``frictionloss`` is the friction at rest, and the plugin
-    adds the rest, which is zero there. Friction that grows with gravity's moment needs the plugin too. An
-    actuator's moment is not known to it: the mean of its part is added to the friction.
+    damping where their error is within the allowance. All other friction is the plugin's own. Without the plugin,
+    friction that depends on the load has its mean.
 
     Args:
         parameters: of the moment law, by name.
@@ -89,14 +80,16 @@ def native_friction(
         may_miss: greatest error of a polynomial, as a share of the greatest friction; infinite: no plugin.
         carried: in the runs, by friction that depends on the load.
     """
-    friction = friction_of(parameters)
+    friction, said = friction_of(parameters), tuple[Fact, ...]()
+    if friction.load and may_miss == np.inf:
+        moment = friction.friction_moment + friction.load * carried.mean
+        parameters = {**parameters, "friction_load": 0.0, "friction_moment": moment}
+        friction, said = friction_of(parameters), (Fact("friction against load"),)
     if friction.load:
-        return _with_load(parameters, rates, law, damping, may_miss, carried)
-    moment, terms = friction.friction_moment, [term for term in AGAINST_RATE if parameters.get(term, 0.0)]
-    if moment == 0.0 or not terms:
-        return NativeMoments(loss=moment, presliding=friction.presliding)
-    if law.slide:
-        return NativeMoments(loss=moment, differences=(Fact("friction against rate"),))
+        return _by_plugin(parameters, carried)
+    moment = friction.friction_moment
+    if moment == 0.0 or not any(parameters.get(term, 0.0) for term in AGAINST_RATE):
+        return NativeMoments(loss=moment, presliding=friction.presliding, differences=said)
     wanted = friction.sliding(rates)
     powers = np.vander(rates / rates[-1], 4, increasing=True)
     least = np.array([0.0, -(law.damping + damping) * rates[-1], -np.inf, -np.inf])
@@ -104,58 +97,27 @@ def native_friction(
     found = nearest_polynomial(powers, wanted, least if may_miss == np.inf else free)
     missed = float(np.max(np.abs(powers @ found - wanted)) / np.max(wanted))
     found = found / rates[-1] ** np.arange(4)
-    if missed < may_miss and (
-        may_miss == np.inf or (found[0] >= 0.0 and law.damping + damping + found[1] >= 0.0)
-    ):
-        figures = {"moment": _AGAINST_RATE, "missed_percent": 100.0 * missed}
-        said = (Fact("polynomial", figures),)
-        return NativeMoments(damping=found[1:], loss=float(found[0]), differences=said)
-    values = {"F": moment, "F0": friction.at_rest} | {
-        symbol: getattr(friction, name) for symbol, name in _SYMBOLS.items()
-    }
-    text = f"-sign(r)*(F*{'*'.join(_FACTORS[term] for term in terms)}-F0)"
-    program = parse(text, frozenset({"r", *values})).program(values, {"r": "rate"})
-    return NativeMoments(loss=friction.at_rest, program=program, differences=(by_plugin(_AGAINST_RATE),))
+    sound = found[0] >= 0.0 and law.damping + damping + found[1] >= 0.0
+    if may_miss != np.inf and not (missed < may_miss and sound):
+        return _by_plugin(parameters, carried)
+    figures = {"moment": ON_RATE, "missed_percent": 100.0 * missed}
+    differences = (*said, Fact("polynomial", figures))
+    return NativeMoments(damping=found[1:], loss=float(found[0]), differences=differences)
 
 
-def _with_load(
-    parameters: Mapping[str, float],
-    rates: Array,
-    law: JointLaw,
-    damping: float,
-    may_miss: float,
-    carried: Carried,
-) -> NativeMoments:
-    """Friction that grows with the load; arguments of `native_friction`.
-
-    A sliding contact: the plugin adds the part of gravity's moment to ``frictionloss``. At rest that part does not
-    hold the joint, since gravity exceeds it, and ``frictionloss`` holds what remains. A contact that deflects is
-    the plugin's own, with the whole friction. The part that the plugin cannot have is added as its mean.
-    """
-    share, (size, rest) = parameters["friction_load"], _weight(parameters)
-
-    def beside(mean: float) -> NativeMoments:
-        moment = parameters.get("friction_moment", 0.0) + share * mean
-        plain = {**parameters, "friction_load": 0.0, "friction_moment": moment}
-        return native_friction(plain, rates, law, damping, may_miss)
-
-    found = beside(carried.beyond)
-    if law.slide or may_miss == np.inf or found.program or not size:
-        found = beside(carried.whole)
-        return replace(found, differences=(*found.differences, Fact("friction against load")))
-    said = [by_plugin(_AGAINST_LOAD)]
-    if carried.beyond:
-        said.append(Fact("friction against load"))
-    differences = (*found.differences, *said)
-    if found.presliding:
-        contact = (
-            ("friction_moment", found.loss, "N m"),
-            ("presliding", found.presliding, "rad"),
-            ("friction_load", share, "1"),
-            ("load_stiffness", size, "N m"),
-            ("load_angle", rest, "rad"),
-        )
-        return NativeMoments(contact=contact, differences=differences)
-    values = {"mu": share, "K": size, "k": rest}
-    program = parse(_LOAD, frozenset({"r", "b", *values})).program(values, {"r": "rate", "b": "angle"})
-    return replace(found, program=program, differences=differences)
+def _by_plugin(parameters: Mapping[str, float], carried: Carried) -> NativeMoments:
+    """Friction that the plugin adds, with its greatest moment in the runs."""
+    friction, units, (size, rest) = friction_of(parameters), parameter_units(), _weight(parameters)
+    names = [name for name in ("friction_moment", *CONTACT) if parameters.get(name, 0.0)]
+    own = tuple((name, parameters[name], units[name]) for name in names if name != "presliding")
+    on = [ON_RATE] if any(name in AGAINST_RATE for name in names) else []
+    if friction.load:
+        own += (("load_stiffness", size, "N m"), ("load_angle", rest, "rad"))
+        on.append(ON_ACTUATOR if carried.by_actuator else ON_GRAVITY)
+    greatest = (friction.friction_moment + friction.load * carried.greatest) * (1.0 + friction.peak)
+    return NativeMoments(
+        loss=greatest,
+        presliding=friction.presliding,
+        contact=own,
+        differences=tuple(map(by_plugin, on)),
+    )

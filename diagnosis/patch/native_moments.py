@@ -29,10 +29,11 @@ class NativeMoments:
     Args:
         spring: added restoring moment, the coefficients of 1, b, b² and b³, N m to N m/rad³, shape (4,).
         damping: added coefficients of ḃ, |ḃ|ḃ and ḃ³, N m s/rad, N m s²/rad² and N m s³/rad³, shape (3,).
-        loss: sliding friction of the joint, N m.
-        presliding: deflection at which a contact of that friction slides, rad or m; 0: ``frictionloss`` has none.
+        loss: sliding friction of the joint; of the plugin's friction the greatest in the runs, N m.
+        presliding: deflection at which a contact of that friction slides, rad or m; 0: none.
         program: of a further moment of the plugin; empty: none.
-        contact: numerics of the plugin's own friction, with their values and units, angles from rest; empty: none.
+        contact: numerics of the plugin's own friction, with their values and units, angles from rest; empty: the
+            friction is MuJoCo's.
         differences: where the native element follows another law, and causes left out.
     """
 

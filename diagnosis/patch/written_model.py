@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from diagnosis.model.fact import Fact
+from diagnosis.patch.native_friction import ON_ACTUATOR
 from diagnosis.settings import AnswerSettings
 from tunnel_sim.files.from_json import UNWRITTEN
 from tunnel_sim.files.writing import as_json
@@ -18,10 +19,10 @@ if TYPE_CHECKING:
 
     from tunnel_sim.engine.joint_model import JointModel
 
-PATCH_EXCUSED: Final = 0.001
-"""Share of the gap that the fit leaves, below which a part of the causes that cannot be written into the
-user's model excuses the patched model. Judgement. Simulated joints: a right law leaves 0.0001, a wrong one
-0.007 or more."""
+LAW_LEAVES: Final = 0.001
+"""Share of the gap that the fit leaves, below which a law of friction under load is right, and a part of the
+causes that cannot be written into the user's model excuses the patched model. Judgement. Simulated joints: a
+right law leaves 0.0001, a wrong one 0.002 or more."""
 
 
 @dataclass(frozen=True)
@@ -55,8 +56,7 @@ class NativeClosure:
         return min(max(1.0 - max(after - 1.0, 0.0) / max(self.before - 1.0, 1e-9), 0.0), 1.0)
 
 
-_OMISSIONS = frozenset({"rod", "friction against rate", "air"})
-_BY_MEAN = "friction against load"  # a mean stands for a part of it
+_OMISSIONS = frozenset({"rod", "air"})
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,22 +176,23 @@ class PatchedModel:
         """Share of the gap that the patched model explains, as a judgement on the causes.
 
         Returns:
-            None where its runs do not show the gap; where a part of the causes cannot be written into the
-            model, and the fit, which has that part, leaves next to nothing of the gap; or where a mean stands for
-            that part, which explains much of the gap whatever the law is.
+            None where its runs do not show the gap; or where a part of the causes cannot be written into the
+            model, and the fit, which has that part, leaves next to nothing of the gap.
         """
         kinds = {fact.kind for fact in self.differences}
-        excused = kinds & _OMISSIONS and 1.0 - self.closed_by_fit < PATCH_EXCUSED
-        return self.closed if self._shown(chosen) and not excused and _BY_MEAN not in kinds else None
+        excused = kinds & _OMISSIONS and 1.0 - self.closed_by_fit < LAW_LEAVES
+        return self.closed if self._shown(chosen) and not excused else None
 
-    def untested(self, chosen: AnswerSettings) -> float | None:
-        """Share of the gap that the fit leaves, where only a mean of a part of the causes is in the patched model.
+    def under_load(self, chosen: AnswerSettings) -> float | None:
+        """Share of the gap that the fit leaves with friction that depends on the moment of an actuator.
 
         Returns:
-            None where the whole causes are, or where the fit leaves next to nothing, as only a right law does.
+            None without such friction, or where the fit leaves next to nothing, as only a right law does. Friction
+            under the mean load explains most of a gap whatever the law is.
         """
-        by_mean, left = any(fact.kind == _BY_MEAN for fact in self.differences), 1.0 - self.closed_by_fit
-        return left if self._shown(chosen) and by_mean and left >= PATCH_EXCUSED else None
+        loaded = any(fact.figures.get("moment") == ON_ACTUATOR for fact in self.differences)
+        left = 1.0 - self.closed_by_fit
+        return left if self._shown(chosen) and loaded and left >= LAW_LEAVES else None
 
     def _shown(self, chosen: AnswerSettings) -> bool:
         """Whether the runs of the comparison show the gap."""

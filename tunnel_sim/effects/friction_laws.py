@@ -19,7 +19,8 @@ from tunnel_sim.vocabulary.record import Array
 _LOW_RATE = 1.0  # rad/s
 _SHOWN = 2.0  # standard deviations from which a presliding range goes beyond the textbook form
 _UNCHANGED_AT = 2.0  # rad/s: where the power of the rate is 1, as in the compiled law
-_CONTACT = {  # parameters of the moment law by those of the friction's forms
+#: Forms of friction by parameters of the moment law.
+CONTACT = {
     "presliding": "presliding",
     "friction_exponent": "exponent",
     "friction_saturation": "saturation",
@@ -174,7 +175,7 @@ class CoulombFriction(Friction):
         friction = cls.column(effects, "friction_moment")
         runs["friction_moment"][:] = friction
         acts = (friction != 0.0) | (cls.column(effects, "load") != 0.0)
-        for term, own in _CONTACT.items():
+        for term, own in CONTACT.items():
             runs[term][:] = np.where(acts, cls.column(effects, own), 0.0)
         runs["friction_peak_rate"][runs["friction_peak"] == 0.0] = 0.0
 
@@ -185,5 +186,5 @@ def friction_of(parameters: Mapping[str, float]) -> CoulombFriction:
     Args:
         parameters: of the law by name, in its units; the others are 0.
     """
-    own = {name: parameters[term] for term, name in _CONTACT.items() if parameters.get(term, 0.0) != 0.0}
+    own = {name: parameters[term] for term, name in CONTACT.items() if parameters.get(term, 0.0) != 0.0}
     return CoulombFriction(parameters.get("friction_moment", 0.0), **own)

@@ -15,7 +15,7 @@ from diagnosis.model.blocks import prepare
 from diagnosis.model.fact import Fact
 from diagnosis.model.joint import with_law
 from diagnosis.model.similar import similar_campaign
-from diagnosis.patch.elements import Control, FoundLaw
+from diagnosis.patch.elements import Control, DryFriction, FoundLaw
 from diagnosis.patch.fitted_law import FittedLaw
 from diagnosis.patch.patched_model import controlled
 from tests.reference.robot_joints import MOTOR, NOISE, TIME, multisine, robot, robot_campaign
@@ -182,3 +182,28 @@ def test_only_a_control_goes_through_the_actuator(tmp_path: Path, swung: Campaig
     moments = robot_campaign(robot(TRUE), (1.0,), column="moment_nm")
     assert controlled(moments, model.law.actuator) == frozenset()
     assert controlled(swung, None) == frozenset()
+
+
+def test_the_mean_load_of_a_held_input_is_that_of_its_values(tmp_path: Path, swung: Campaign) -> None:
+    """A control that alternates between ±u from sample to sample is ±u at every time: the mean size is u."""
+    model = own_model(tmp_path, swung, robot(TRUE))
+    stated, joint = with_law(swung, model.law)
+    similar, change = similar_campaign(stated, joint)
+    joint = joint.of(stated).similar(change)
+    prepared = prepare(similar, {run.id: NOISE**2 for run in swung.runs}, change, model=joint)
+    alternating = 0.3 * (-1.0) ** np.arange(TIME.size)
+    prepared = prepared.with_runs(tuple(run.with_input(values=alternating) for run in prepared.runs))
+    fixed = {
+        "coulomb_friction.friction_moment": change.similar(0.1, "N m"),
+        "coulomb_friction.load": 0.05,
+        "input_delay.delay": change.similar(0.3 * (TIME[1] - TIME[0]), "s"),
+    }
+    kinds = effect_class("coulomb_friction"), effect_class("input_delay")
+    problem = Problem(prepared, kinds, tuple(fixed.items()))
+    common, own = np.zeros(len(problem.names)), np.zeros(len(problem.parameters.own))
+    common[problem.names.index("yaw_inertia")] = 1.0
+    law = FittedLaw(problem, common, own, controlled=(own, 0), native_only=True)
+    friction = DryFriction.fit(law)
+    assert model.law.actuator is not None
+    assert friction.moment == pytest.approx(0.1 + 0.05 * 0.3 * model.law.actuator.gain, rel=1e-3)
+    assert not friction.own
