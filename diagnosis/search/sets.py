@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from diagnosis.likelihood.least_squares import Fit, FitError, fit, try_fit
+from diagnosis.likelihood.least_squares import Fit, FitError, fit, scaled_residuals, try_fit
 from diagnosis.likelihood.residuals import misfit
 from diagnosis.model.fact import Fact
 from diagnosis.search.clock import StepClock
@@ -167,12 +167,15 @@ def with_near_rivals(sets: Sets, rivals: Sequence[Rival], clock: StepClock) -> S
 
 def _with_near_sets(sets: Sets, clock: StepClock) -> Sets:
     """Add every set with one effect less than the answer, or with an equivalent effect."""
-    best, view = sets.best, sets.view
-    if best is None or len(best.effects) == 1:
+    pruned, view = set[Names](), sets.view
+    while (best := sets.best) is not None and len(best.effects) > 1 and best.names not in pruned:
+        pruned.add(best.names)  # a part of it may be the answer now
+        with clock.step("pruning"):
+            by_name = {h.names: h for h in (*sets.hypotheses, *prune(best, sets.hypotheses))}
+            known = tuple(by_name.values())
+            sets = replace(sets, hypotheses=(*known, *exchange(best, known, view.base)))
+    if not pruned:
         return sets
-    with clock.step("pruning"):
-        known = (*sets.hypotheses, *prune(best, sets.hypotheses))
-        sets = replace(sets, hypotheses=(*known, *exchange(best, known, view.base)))
     with clock.step("forms"):  # of rival sets, freed where that pays: growth frees those of few sets
         near = [w.effects for w in sets.weighed if w.effects != UNKNOWN and w.probability > RIVAL_FORMS]
         if len(near) < 2:
@@ -204,20 +207,30 @@ def resolved(sets: Sets) -> Sets:
 
 
 def prune(whole: Hypothesis, found: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """The hypotheses with one effect less than a given one that are not fitted yet.
+    """The hypotheses with one effect less than a given one that are not fitted yet, or not with its forms.
+
+    Growth frees the forms of few sets. A set may owe its fit to the form of one effect, and not to another effect.
 
     Returns:
         The new ones, each started from the values of the whole.
     """
-    known = {hypothesis.names for hypothesis in found}
+    known = {hypothesis.names: hypothesis.fit for hypothesis in found}
     smaller = []
     for kind in whole.fit.problem.effects:
         names = tuple(name for name in whole.effects if name != kind.name)
-        if names and tuple(sorted(names)) not in known:
+        part = known.get(tuple(sorted(names)))
+        if names and (part is None or not {*part.problem.free_forms} >= {*whole.fit.problem.free_forms}):
             with suppress(FitError, np.linalg.LinAlgError):
                 start = restricted(whole.fit, names)
-                smaller.append(Hypothesis(names, fit(start.problem, start.point)))
+                if part is None or _total(start) < part.total:
+                    smaller.append(Hypothesis(names, fit(start.problem, start.point), textbook=part))
     return smaller
+
+
+def _total(start: Fit) -> float:
+    """The χ² at the point of a fit, whose residuals are those of another problem."""
+    left = scaled_residuals(start.problem, start.point)
+    return sum(float(r @ r) for r in left) + start.problem.parameters.surprise(start.point)
 
 
 def exchange(whole: Hypothesis, found: Sequence[Hypothesis], nominal: Fit) -> list[Hypothesis]:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from diagnosis.likelihood.least_squares import Fit, fit
+from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import ChannelMisfit, misfit, resonance
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.parameters import Point
@@ -158,6 +159,29 @@ def test_pruning_fits_the_smaller_sets_that_are_missing(of_three):
         if hypothesis.names in grown:
             assert hypothesis.fit.total == pytest.approx(grown[hypothesis.names], rel=0.02)
     assert prune(whole, [*ranked, *smaller]) == []
+
+
+def test_pruning_gives_a_part_the_form_that_the_whole_needs():
+    """Growth may free the form of friction beside another effect only, which then explains nothing."""
+    friction = effect_from("coulomb_friction", {"friction_moment": 0.01, "presliding": 0.05})
+    base = nominal(campaign(friction, duration=8.0))
+    both = effect_class("coulomb_friction"), effect_class("sensor_drift")
+    free = ("coulomb_friction.presliding",)
+    known = dict(zip(base.problem.names, base.point.common.tolist(), strict=True))
+    known |= {"coulomb_friction.friction_moment": 0.01, free[0]: 0.05}
+
+    def fitted(*kinds, forms=()):
+        problem = Problem(base.problem.data, kinds, free_forms=forms)
+        start = np.array([known.get(name, 0.0) for name in problem.names])
+        return Hypothesis(tuple(kind.name for kind in kinds), fit(problem, Point(start, base.point.per_run)))
+
+    whole, textbook = fitted(*both, forms=free), fitted(both[0])
+    better = next(h for h in prune(whole, [textbook]) if h.effects == ("coulomb_friction",))
+    assert better.fit.problem.free_forms == free
+    assert better.fit.total < 0.5 * textbook.fit.total
+    assert better.textbook is textbook.fit
+    assert prune(whole, [better, fitted(both[1])]) == []
+    assert prune(fitted(*both), [textbook, fitted(both[1])]) == []
 
 
 ALIKE = ("gravity_stiffness", "spring_miscalibration")  # two springs cannot tell one from the other
