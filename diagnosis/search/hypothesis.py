@@ -96,6 +96,16 @@ class Hypothesis:
             numbers -= 2 * (spring < needless)
         return numbers
 
+    @property
+    def under_load(self) -> bool:
+        """Whether it is one effect alone that may grow with the moment of an actuator.
+
+        Its textbook form then explains little, and says little of its form under load.
+        """
+        problem = self.fit.problem
+        by_load = any(info.of_load for kind in problem.effects for info in kind.parameters())
+        return by_load and len(self.effects) == 1 and problem.data.driven and problem.carries_load
+
     @cached_property
     def excess(self) -> Array:
         """χ² beyond noise of the set, by channel, shape (6,), dimensionless.
@@ -298,7 +308,7 @@ def with_forms(
     Args:
         gap: misfit of the nominal model.
         least: excess of a textbook form from which freeing it is tried, dimensionless (noise variances).
-        count: number of the best that are tried with free forms.
+        count: number of the best that are tried with free forms, beside those that may act under load.
 
     Returns:
         All hypotheses, best first.
@@ -306,8 +316,8 @@ def with_forms(
     ranked = sorted(found, key=lambda h: h.fit.total)
     for place, hypothesis in enumerate(ranked):
         textbook = hypothesis.fit
-        if place == count:
-            break
+        if place >= count and not hypothesis.under_load:
+            continue
         scale = Scale.of(ranked, gap, textbook.settings.weighing)
         needless = textbook is hypothesis.plain or textbook.excess <= least
         if needless or scale.with_form(hypothesis) <= max(map(scale.weight, ranked)):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,10 +12,13 @@ import numpy as np
 import pytest
 
 from diagnosis import diagnose, vocabulary
-from diagnosis.likelihood.least_squares import fit
+from diagnosis.likelihood.least_squares import Fit, fit, fit_at
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import misfit
+from diagnosis.model.blocks import prepare
+from diagnosis.model.joint import with_law
 from diagnosis.model.parameters import Point
+from diagnosis.model.similar import similar_campaign
 from diagnosis.patch.native_friction import Carried, native_friction
 from diagnosis.search import hypothesis
 from diagnosis.search.hypothesis import Hypothesis, _choices, with_forms
@@ -202,6 +206,38 @@ def campaign_of(
         reading = moves(xml, start, control, back, share) + noise
         runs.append(Run(f"r{place + 1}", Record(TIME, reading), 0.0, drive=drive))
     return Campaign("robot", RigProperties(), SensorProperties(RATE), tuple(runs))
+
+
+@pytest.mark.parametrize("driven", [False, True])
+def test_friction_under_the_load_of_an_actuator_is_tried_though_others_fit_better(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, driven: bool
+) -> None:
+    """The textbook's friction explains little of friction under load."""
+    actuators = MOTOR if driven else ""
+    xml = robot(TRUE, axis=LEVEL, actuators=actuators, tip=0.2)
+    data = campaign_of(xml, driven=driven)
+    stated, joint = with_law(data, own_model(tmp_path, data, xml).law)
+    similar, change = similar_campaign(stated, joint)
+    prepared = prepare(similar, {run.id: NOISE**2 for run in data.runs}, change, model=joint.similar(change))
+    tried = list[tuple[str, ...]]()
+
+    def of(name: str, scale: float) -> Hypothesis:
+        problem = Problem(prepared, (effect_class(name),))
+        common, own = np.zeros(len(problem.names)), np.zeros((len(data.runs), len(problem.parameters.own)))
+        common[problem.names.index("yaw_inertia")] = 1.0
+        found = fit_at(problem, Point(common, own))
+        return Hypothesis((name,), replace(found, residuals=[scale * r for r in found.residuals]))
+
+    def recorded(fitted: Fit, forms: Sequence[tuple[str, ...]], **rest: float) -> None:
+        del fitted, rest
+        tried.extend(forms)
+
+    monkeypatch.setattr(hypothesis, "_free_forms", recorded)
+    monkeypatch.setattr(hypothesis, "deepest", lambda fitted: fitted)
+    better = [of(name, 0.5) for name in ("quadratic_damping", "cubic_stiffness", "sensor_nonlinearity")]
+    with_forms([*better, of("coulomb_friction", 1.0)], misfit(of("quadratic_damping", 1.0).fit), 0.0)
+    assert tried
+    assert ((LOAD,) in tried) == driven
 
 
 @pytest.mark.parametrize("driven", [False, True])
