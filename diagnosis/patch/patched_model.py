@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from pathlib import Path
 
@@ -54,8 +54,11 @@ def native_closure(
     chosen_out: HeldOut,
     simulate: Simulate,
     native: frozenset[str] = frozenset(),
-) -> NativeClosure:
+) -> tuple[NativeClosure, dict[int, Restart]]:
     """Simulate held-out runs with the patched model of the fit that has not used them; only with the wind off.
+
+    Returns:
+        With the restarts of the runs held out as a whole, by index.
 
     Args:
         nominal: fit of the given model.
@@ -71,6 +74,7 @@ def native_closure(
     known = chosen_out.points.keys() & nominal_out.residuals.keys()
     still = [run.id for run in chosen.problem.data.in_still_air]
     held = [i for i, run in enumerate(runs) if run.id in known.intersection(still)]
+    restarts: dict[int, Restart] = {}
     before: list[Array] = []
     fitted: list[Array] = []
     engine: list[Array] = []
@@ -78,7 +82,8 @@ def native_closure(
         common, start = chosen_out.points[runs[i].id]
         before.append(nominal_out.residuals[runs[i].id])
         fitted.append(chosen_out.residuals[runs[i].id])
-        engine.append(_restarted(chosen.problem, common, start, i, simulate, native)[1])
+        restarts[i] = _restarted(chosen.problem, common, start, i, simulate, native)
+        engine.append(restarts[i].residual)
     ids = [] if held else still
     if ids:
         turns = turns_of(nominal, ids)
@@ -92,10 +97,10 @@ def native_closure(
             for i, left in enumerate(out):
                 if left.any():
                     start = point.per_run[i]
-                    seen = _restarted(chosen.problem, point.common, start, i, simulate, native, seen=~left)[1]
+                    seen = _restarted(chosen.problem, point.common, start, i, simulate, native, seen=~left)
                     before.append(plain[runs[i].id][left])
                     fitted.append(caused[runs[i].id][left])
-                    engine.append(seen[left])
+                    engine.append(seen.residual[left])
     if not engine:
         raise TunnelError("no run with the wind off could be held out", remedy="add runs with the wind off")
     nominal_power, fit_power, native_power = (
@@ -103,7 +108,23 @@ def native_closure(
     )
     count = sum(left.size for left in before)
     p_value = float(chdtrc(count, count * nominal_power))
-    return NativeClosure(nominal_power, fit_power, native_power, ON_RUNS if held else ON_STRETCHES, p_value)
+    on = ON_RUNS if held else ON_STRETCHES
+    return NativeClosure(nominal_power, fit_power, native_power, on, p_value), restarts
+
+
+@dataclass(frozen=True, eq=False)
+class Restart:
+    """A run whose start is refitted in the engine.
+
+    Args:
+        own: its own parameters, shape (own,).
+        residual: as `engine_residual`, shape (n,).
+        slopes: of the residual to the angle and the rate at the start, with the opposite sign, shape (n, 2).
+    """
+
+    own: Array
+    residual: Array
+    slopes: Array
 
 
 def _restarted(
@@ -114,8 +135,13 @@ def _restarted(
     simulate: Simulate,
     native: frozenset[str],
     seen: NDArray[np.bool_] | None = None,
-) -> tuple[Array, Array]:
-    """A run's own parameters, its start refitted in the engine to the fitted part, and its `engine_residual`."""
+    slopes: Array | None = None,
+) -> Restart:
+    """Refit the start of a run in the engine to the fitted part of the run.
+
+    Args:
+        slopes: from another restart of the run at nearly the same parameters; None: simulated here.
+    """
     seen = np.ones(problem.data.runs[index].reading.size, bool) if seen is None else seen
 
     def left(per_run: Array) -> Array:
@@ -123,20 +149,21 @@ def _restarted(
 
     best = left(own)
     # derivatives of the engine: its frequency may depend on the amplitude where that of the fit does not
-    size = max(abs(float(own[0])), 1e-3)
-    steps = _SHIFT * size * np.array([1.0, 10.0])
-    slopes = [(best - left(own + step * np.eye(own.size)[k])) / step for k, step in enumerate(steps)]
-    columns = np.array(slopes).T[seen]
+    if slopes is None:
+        steps = _SHIFT * max(abs(float(own[0])), 1e-3) * np.array([1.0, 10.0])
+        moved = [(best - left(own + step * np.eye(own.size)[k])) / step for k, step in enumerate(steps)]
+        slopes = np.array(moved).T
+    columns = slopes[seen]
     for _ in range(_RELEASE_STEPS):  # the start moves too little to change them
         move = np.linalg.lstsq(columns, best[seen], rcond=1e-10)[0]
         if np.sum((columns @ move) ** 2) <= _NO_DROP * np.sum(best[seen] ** 2):
             break
         trial = own + np.concatenate([move, np.zeros(own.size - 2)])
-        moved = left(trial)
-        if not moved[seen] @ moved[seen] < best[seen] @ best[seen]:
+        there = left(trial)
+        if not there[seen] @ there[seen] < best[seen] @ best[seen]:
             break
-        own, best = trial, moved
-    return own, best
+        own, best = trial, there
+    return Restart(own, best, slopes)
 
 
 def engine_residual(
@@ -259,7 +286,7 @@ def _written_model(
 
     identified = law(chosen.point.common)
     native = frozenset[str]() if identified.element(Control) is None else runs
-    closure = native_closure(study.nominal, chosen, nominal_out, chosen_out, simulate, native)
+    closure, restarts = native_closure(study.nominal, chosen, nominal_out, chosen_out, simulate, native)
     engine = compiled(chosen.point.common.tobytes())
     rest, slide = model.law.rest, model.law.slide
     limits = (fact for one in identified.elements for fact in one.limits(engine, rest, slide=slide))
@@ -269,7 +296,11 @@ def _written_model(
     own = list(chosen.point.per_run)
     if given is not None:  # the engine's steps and its input do not begin as those of the fit
         common = chosen.point.common
-        own = [_restarted(chosen.problem, common, one, i, simulate, native)[0] for i, one in enumerate(own)]
+        for i, one in enumerate(own):
+            held, slopes = restarts.get(i), None
+            if held is not None:
+                one, slopes = np.concatenate([held.own[:2], one[2:]]), held.slopes
+            own[i] = _restarted(chosen.problem, common, one, i, simulate, native, slopes=slopes).own
     inputs = [run.moment(1.0) if run.id in runs else None for run in problem.data.runs]
     starts = [replace(_start(problem, one, i), drive=inputs[i]) for i, one in enumerate(own)]
     spec, written = patched(model, identified.elements, starts)

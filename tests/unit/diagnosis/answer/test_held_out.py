@@ -117,5 +117,5 @@ def test_a_patched_model_that_is_right_closes_the_gap_of_swings_of_a_milliradian
     common = np.where([name == "zero" for name in fitted.problem.names], 0.0, fitted.point.common)
     point = (common, np.array([1.03e-3, 0.9e-3]))
     out = HeldOut({"a": fitted.residuals[0]}, {"a": point})
-    closure = native_closure(fitted, fitted, out, out, swing)
+    closure, _ = native_closure(fitted, fitted, out, out, swing)
     assert closure.native == pytest.approx(1.0, abs=0.2)
