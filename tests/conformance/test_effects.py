@@ -9,8 +9,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from diagnosis.likelihood.least_squares import fit_at
+from diagnosis.model.parameters import Point
 from tests.reference.effect_cases import VALUES, VOCABULARY, settings
 from tests.reference.effect_oracle import Setting
+from tests.support.gap_campaigns import added, campaign, nominal
 from tunnel_sim.effects import ALL_EFFECTS, Effect, EffectChain, effect_class, effect_from
 from tunnel_sim.effects.chain import with_effects
 from tunnel_sim.engine import effect_laws
@@ -134,6 +137,25 @@ def test_without_its_random_part_an_effect_is_refused_rather_than_left_out(kind:
     ) as caught:
         applied(example(kind))
     assert str(caught.value).isprintable()
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [kind for kind in ALL_EFFECTS if kind.shown_forms(load_varies=False) and not kind.driven],
+    ids=lambda kind: kind.name,
+)
+def test_a_fit_sees_every_form_from_where_it_frees_it(kind: type[Effect]) -> None:
+    """Where a form changes no reading, its slope is zero, and a fit stays at the textbook form."""
+    fitted = added(nominal(campaign(kind(*kind.example))), kind.name)
+    starts = {f"{kind.name}.{info.name}": info.form_start for info in kind.parameters()}
+    known = dict(zip(fitted.problem.names, fitted.point.common.tolist(), strict=True))
+    for form in kind.shown_forms(load_varies=False):
+        freed = replace(fitted.problem, free_forms=tuple(f"{kind.name}.{name}" for name in form))
+        start = np.array([known.get(name, starts.get(name)) for name in freed.names])
+        sensitivities = fit_at(freed, Point(start, fitted.point.per_run)).jacobian
+        for name in freed.free_forms:
+            place = freed.names.index(name)
+            assert sum(float(common[:, place] @ common[:, place]) for common, _ in sensitivities) > 0.0, name
 
 
 @each_effect

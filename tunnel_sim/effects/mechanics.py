@@ -349,7 +349,7 @@ class StructuralDamping(Effect):
     loss_factor: float = parameter("η", "1", "loss factor", scale=0.005, lower=-1.0, upper=1.0, fit_lower=0.0)
     after_effect: float = parameter(
         "m", "1", "after-effect of the release, relative to a loss factor equal at all frequencies",
-        scale=1.0, lower=-10.0, upper=10.0, form=True,
+        scale=1.0, lower=0.0, upper=10.0, form=True,
     )  # fmt: skip
 
     @classmethod
