@@ -28,6 +28,8 @@ from tunnel_sim.effects.registry import effect_class
 
 RUNS_LISTED: Final = 12
 """Maximum number of runs in a sentence. Judgement."""
+RUNS_TO_LOOK_AT: Final = 4
+"""Maximum number of runs that a step names; of more it gives the number. Judgement."""
 ONE_WIND: Final = 0.02
 """Ratio of the powers with and without wind below which nearly all of the gap belongs to one of them.
 Judgement."""
@@ -161,7 +163,9 @@ def _places(where: Where, place: PlaceFound) -> list[str]:
 
 def runs_of_the_gap(where: Where, place: PlaceFound | None) -> str:
     """The runs that show the gap, by name where not all do."""
-    return named_runs(where.runs) if place and 0 < len(where.runs) < place.runs else "the runs"
+    if not place or not 0 < len(where.runs) < place.runs:
+        return "the runs"
+    return named_runs(where.runs) if len(where.runs) <= RUNS_TO_LOOK_AT else f"the {len(where.runs)} runs"
 
 
 def _agreement(where: Where, place: PlaceFound) -> str:

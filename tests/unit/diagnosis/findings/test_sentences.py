@@ -12,13 +12,13 @@ from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary
 from diagnosis.findings.coefficients import Coefficients, size_note
 from diagnosis.findings.decision import decision
 from diagnosis.findings.misfit import Misfit
-from diagnosis.findings.place import REASONS, reason
+from diagnosis.findings.place import REASONS, reason, runs_of_the_gap
 from diagnosis.findings.terms import KINDS
 from diagnosis.findings.whole import Found
 from diagnosis.model.fact import Fact, Noted
 from diagnosis.result import Diagnosis
 from diagnosis.settings import Settings
-from diagnosis.where.described import Nowhere, Where
+from diagnosis.where.described import Nowhere, PlaceFound, Where
 from identification.estimate import Quantity
 from tests.support.diagnosis_document import CAUSE, IDS, RIVAL, document, findings_of
 from tests.support.rendered import closable_table, closable_words, coefficient_note, rest_words, where_words
@@ -331,3 +331,11 @@ def test_an_answer_in_words_has_all_of_them_and_writes_them_once() -> None:
     assert [text.partition(" ")[0] for text in once.cautions] == ["The"]
     assert [remark.runs for remark in once.remarks] == [("a",)]
     assert once.in_words() == once
+
+
+@pytest.mark.parametrize(
+    ("shown", "said"), [(0, "the runs"), (2, "runs r0, r1"), (11, "the 11 runs"), (16, "the runs")]
+)
+def test_a_step_names_a_few_runs_and_counts_more(shown: int, said: str) -> None:
+    place = PlaceFound(16, 0.9, 0.01, {}, (), {}, Fact("none"), Fact("none"))
+    assert runs_of_the_gap(Where(None, None, tuple(f"r{i}" for i in range(shown))), place) == said
