@@ -66,7 +66,8 @@ def diagnosable(campaign: Campaign, *, judged: bool = True) -> Diagnosable:
     """
     sensor = campaign.sensor if judged else replace(campaign.sensor, plausible=False)
     examined = examine(replace(campaign, sensor=sensor)).accepted()
-    examined = replace(examined, campaign=replace(examined.campaign, sensor=campaign.sensor))
+    sensor = replace(examined.campaign.sensor, plausible=campaign.sensor.plausible)
+    examined = replace(examined, campaign=replace(examined.campaign, sensor=sensor))
     cycling = {name for r in examined.remarks if in_limit_cycle(r.figures) for name in r.runs}
     if not cycling:
         return Diagnosable(examined.campaign, examined.remarks)

@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from diagnosis import diagnose
+from diagnosis.diagnosable import diagnosable
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import nominal_start
@@ -38,6 +40,15 @@ def test_zeros_that_differ_are_given_to_every_run_and_said():
     assert remark.runs == tuple(name for name, _ in REPEATS)
     assert "0.06 rad" in remark.what
     assert identify(data).remarks == (remark,)
+
+
+@pytest.mark.parametrize("judged", [True, False])
+def test_a_diagnosis_fits_the_zeros_that_it_says_it_fits(judged):
+    data = repeats(OWN)
+    assert diagnosable(data, judged=judged).campaign.sensor == replace(data.sensor, zero="per_run")
+    found = diagnose(data)
+    assert found.causes == ()
+    assert "separate zero" in " ".join(remark.what for remark in found.remarks)
 
 
 @pytest.mark.parametrize("zero", ["common", "per_run"])
