@@ -21,6 +21,17 @@
     }                                                                  \
   } while (0)
 
+// Under a sanitizer MuJoCo's header calls instrumented functions for its stack, which the released library does not
+// have: its plain ones stand in for them.
+void plain_mark_stack(mjData* d) __asm__("mj_markStack");
+void plain_free_stack(mjData* d) __asm__("mj_freeStack");
+void mj__markStack(mjData* d) {
+  plain_mark_stack(d);
+}
+void mj__freeStack(mjData* d) {
+  plain_free_stack(d);
+}
+
 static jmp_buf back;
 static char message[1024];
 
