@@ -17,13 +17,13 @@ from scipy.special import fdtrc
 
 from diagnosis.likelihood.ceiling import Unexplained
 from diagnosis.likelihood.least_squares import Fit, FitError, fit, fit_at, try_fit
-from diagnosis.likelihood.normal_equations import by_run
 from diagnosis.likelihood.paths import COMMON
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, gap_left, misfit
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
-from diagnosis.search.grow import MOST_CAUSES, grow
+from diagnosis.search.evident import evident, needed
+from diagnosis.search.grow import grow
 from diagnosis.search.hypothesis import Hypothesis, Scale, of_more_weight, restricted
 from diagnosis.search.one_more import sets_with_one_more
 from diagnosis.search.process_noise import (
@@ -40,15 +40,12 @@ from diagnosis.search.scatter import with_likeliest_widths
 from diagnosis.search.steady_noise import is_a_line, is_steady_noise
 from diagnosis.search.weigh import FittedSet, log_weight
 from tunnel_sim.effects import Effect
-from tunnel_sim.effects.capabilities import AtRandom, OwnNumbers, Periodic
+from tunnel_sim.effects.capabilities import AtRandom, OwnNumbers
 
 ALIKE_WITHIN: Final = 20.0
 """Difference of −2 ln L below which two kinds of random moment explain the residuals equally well, in χ².
 Judgement (decision 0046). The minimum drop for a random moment: real spectra are not first-order, and smaller
 differences reflect the shape of the spectrum."""
-EVIDENT_FROM: Final = 20.0
-"""Minimum drop of χ² for a further effect beside a random moment to be evident. Judgement. Two parameters
-lower χ² by more than 20 by chance once in 22,000 effects tried."""
 FURTHER_EFFECTS: Final = 2
 """Maximum number of effects added to make the innovations white. Judgement. Time against coverage."""
 LAW_SHARE: Final = 0.5
@@ -144,7 +141,7 @@ class _Beside:
         top, exchanges = _settled(best, view, source)
         for number in range(FURTHER_EFFECTS + 1):
             if number > 0:  # a small effect that no gap shows may keep the innovations from being white
-                further = _evident(top, view.able)
+                further = evident(top, view.able)
                 if not further:
                     break
                 top, exchanges = further[0], exchanges | _exchanges(further)
@@ -244,53 +241,6 @@ def without_the_random_moment(
                 alone = replace(answer.beside, fit=fitted)
                 found[alone.names] = of_more_weight(found.get(alone.names), alone, gap)
     return list(found.values())
-
-
-def _evident(top: Hypothesis, kinds: Sequence[type[Effect]]) -> list[Hypothesis]:
-    """The set with one more effect that is evident beside the random moment, the most evident first.
-
-    The noise is estimated from the residuals, and no real spectrum has its form, so the scatter between the runs
-    shows how much of a drop of χ² is chance. An effect with an instant in every run must lower χ² for each instant
-    as well.
-    """
-    if len(top.effects) >= MOST_CAUSES:
-        return []
-    able = {kind.name: kind for kind in kinds if not issubclass(kind, Periodic)}
-    larger = sets_with_one_more([top], list(able.values()))
-    gains = [_gain(h, able[h.effects[-1]], top.fit) for h in larger]
-    order = sorted(range(len(larger)), key=lambda i: -gains[i])
-    return [larger[i] for i in order if gains[i] > EVIDENT_FROM]
-
-
-def _gain(larger: Hypothesis, kind: type[Effect], without: Fit) -> float:
-    """Drop of χ² by an effect for each of its numbers, over what chance multiplies it by."""
-    drop = without.total - larger.fit.total
-    return drop / overdispersion(larger.fit, kind) / _numbers(larger.fit, kind)
-
-
-def _numbers(fitted: Fit, kind: type[Effect]) -> int:
-    """Numbers of an effect that chance may fit: its severity, and the instants and phases of every run."""
-    problem = fitted.problem
-    return 1 + len(kind.per_run_parameters(problem.instants)) * len(problem.data.runs)
-
-
-def _needed(top: Hypothesis) -> Hypothesis:
-    """The set without effects that are not evident beside the random moment.
-
-    An effect with a phase in every run, as vortices have, may gain weight by them without being evident.
-    """
-    known = top.fit
-    for kind in known.problem.effects:
-        severity, reach = f"{kind.name}.{kind.parameters()[0].name}", EVIDENT_FROM * _numbers(known, kind)
-        if severity not in known.problem.names:
-            continue
-        if known.value(severity) ** 2 < reach * known.std(severity) ** 2:
-            rest = tuple(name for name in top.effects if name != kind.name)
-            start = restricted(known, rest)
-            without = try_fit(start.problem, start.point)
-            if without is not None and _gain(top, kind, without) < EVIDENT_FROM:
-                return _needed(replace(top, effects=rest, fit=without, textbook=None))
-    return top
 
 
 def _may_act(source: MomentSource, best: Hypothesis, scale: Scale) -> bool:
@@ -404,24 +354,6 @@ def _closed_by_a_law(fitted: Fit, kinds: Sequence[str], share: float) -> bool:
     return any(one.closed - LAW_STDS * one.std > share for one in found)
 
 
-def overdispersion(fitted: Fit, kind: type[Effect]) -> float:
-    """Variance of an effect's parameters over that of independent noise, 1 or more.
-
-    Returns:
-        From the scatter of the runs' gradients, whose sum is zero (the sandwich covariance with the runs
-        as clusters; Liang and Zeger, Biometrika 73 (1986) 13), the mean over the parameters.
-    """
-    matrices, gradients, _ = by_run(fitted.jacobian, fitted.residuals, products=fitted.products)
-    own = [i for i, name in enumerate(fitted.problem.names) if name.split(".")[0] == kind.name]
-    total = matrices.sum(axis=0)
-    size = np.sqrt(np.maximum(np.diag(total), 1e-300))
-    inverse = np.linalg.pinv(total / np.outer(size, size), rcond=1e-12)
-    scatter = (gradients / size).T @ (gradients / size) * len(gradients) / max(len(gradients) - 1, 1)
-    robust = (inverse @ scatter @ inverse)[np.ix_(own, own)]
-    naive = inverse[np.ix_(own, own)]
-    return max(1.0, float(np.trace(np.linalg.pinv(naive) @ robust)) / max(len(own), 1))
-
-
 def _exchanges(sets: Sequence[Hypothesis]) -> set[tuple[str, str]]:
     """An effect of the first set and the one in its place in another that explains the runs nearly as well."""
     first, *others = sets
@@ -478,11 +410,11 @@ def _settled(
             # a random moment leaves little of a gap for comparing effects where it acts: more are added while one
             # seen there alone is evident, the most evident of all, so that none absorbs the residual of another
             exchanges |= _exchanges([found, *sets])
-            top = _needed(_sought_again(found))
-            further = _evident(top, kinds)
+            top = needed(_sought_again(found))
+            further = evident(top, kinds)
             while any(h.effects[-1] in hidden for h in further):
                 top, exchanges = further[0], exchanges | _exchanges(further)
-                further = _evident(top, kinds)
+                further = evident(top, kinds)
             if top.names == best.names:
                 return top, exchanges
             reached[top.names] = top

@@ -8,7 +8,8 @@ import pytest
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import starting_points
-from diagnosis.search.random_moments import follows_the_motion, overdispersion
+from diagnosis.search.evident import overdispersion
+from diagnosis.search.random_moments import follows_the_motion
 from tests.support.gap_campaigns import campaign, nominal
 from tunnel_sim.effects import effect_class, effect_from
 

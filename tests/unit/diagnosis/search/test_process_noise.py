@@ -13,6 +13,7 @@ from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.run_noise import NoiseWithMoment
 from diagnosis.search import process_noise as pn
 from diagnosis.search import random_moments
+from diagnosis.search.evident import needed
 from diagnosis.search.grow import grow
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.process_noise import with_response
@@ -500,4 +501,4 @@ def test_an_effect_that_is_not_evident_beside_a_random_moment_goes():
     noisy = replace(base.problem, data=with_response(base, (SpectrumPart(3e-3, 1.0, source=STREAM),)))
     fitted = added(fit(noisy, base.point), "coulomb_friction", "vortex_shedding")
     both = Hypothesis(("coulomb_friction", "vortex_shedding"), fitted)
-    assert random_moments._needed(both).effects == ("coulomb_friction",)
+    assert needed(both).effects == ("coulomb_friction",)
