@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 from scipy.special import chdtri
 
-from diagnosis.likelihood.least_squares import Fit, scaled_residuals, try_fit
+from diagnosis.likelihood.least_squares import Fit, fit_at, scaled_residuals, try_fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.scatter_widths import Between, Kept, ScatterColumns, width_prior
 from diagnosis.likelihood.sensitivities import sensitivities
@@ -255,11 +255,15 @@ def likelier(fitted: Fit, repeating: Fit | None = None) -> Fit:
         return fitted
     if repeating is None:
         repeating = try_fit(*without_deviations(fitted), max_iterations=_REPEATING)
-    if repeating is None or not repeating.total < fitted.unlikelihood:
+    if repeating is None:
         return fitted
     least = width_prior(fitted.problem).least
     scatter = tuple(one.as_wide_as(width) for one, width in zip(fitted.problem.scatter, least, strict=True))
-    again = try_fit(*with_deviations(repeating.problem, repeating.point, scatter))
+    start = fit_at(*with_deviations(repeating.problem, repeating.point, scatter))
+    # no form is exact, and its error between runs needs narrow deviations
+    if start.between is None or not start.between.likelihood < fitted.unlikelihood:
+        return fitted
+    again = try_fit(with_widths(start.problem, start.between), start.point)
     again = None if again is None else with_likeliest_widths(again)
     return again if again is not None and again.unlikelihood < fitted.unlikelihood else fitted
 
