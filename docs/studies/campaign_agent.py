@@ -21,17 +21,17 @@ from gymnasium.wrappers.vector import NormalizeObservation
 
 import tunnel_sim.envs  # noqa: F401  registers the environments
 from docs.studies.campaign_policies import Row, from_csv, play_all, replaced, table, to_csv
-from tunnel_lab.envs.campaign import CampaignEnv
-from tunnel_lab.envs.policies import (
+from docs.studies.policies import Action
+from docs.studies.trained_policy import (
     FEATURES,
     LAYERS,
-    Action,
     Agent,
     features,
     menu_text,
-    packaged_agent,
     read_agent,
+    stored_agent,
 )
+from tunnel_lab.envs.campaign import CampaignEnv
 from tunnel_lab.envs.session import Knowledge
 from tunnel_sim.files.writing import write_whole
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -61,7 +61,7 @@ def make(count: int, **arguments: Any) -> NormalizeObservation:
 
 
 def model_of(envs: NormalizeObservation, seed: int, **changes: Any) -> Any:
-    """Stable-Baselines3's PPO with the settings of the packaged agent.
+    """Stable-Baselines3's PPO with the settings of the stored agent.
 
     Args:
         envs: normalised, in parallel.
@@ -71,7 +71,7 @@ def model_of(envs: NormalizeObservation, seed: int, **changes: Any) -> Any:
     from stable_baselines3 import PPO
     from stable_baselines3.common.vec_env import VecMonitor
 
-    from tunnel_sim.envs.stable_baselines import BaselinesVecEnv
+    from docs.studies.stable_baselines import BaselinesVecEnv
 
     settings: dict[str, Any] = {
         "n_steps": 128,
@@ -154,14 +154,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     training.add_argument("--seed", type=int, default=0, help="of network and environment")
     scoring = commands.add_parser("score", help="score an agent in the full simulation")
     scoring.add_argument("docs", type=Path, help="the folder docs of the source tree")
-    scoring.add_argument("--agent", type=Path, help="its file; the packaged agent where left out")
+    scoring.add_argument("--agent", type=Path, help="its file; the stored agent where left out")
     scoring.add_argument("--seed", type=int, default=1, help="of the training of --agent, for the table")
     given = parser.parse_args(arguments)
     if given.command == "train":
         write_whole(given.out, train(given.steps, given.seed).to_bytes())
         return 0
     try:
-        agent = packaged_agent() if given.agent is None else read_agent(given.agent)
+        agent = stored_agent() if given.agent is None else read_agent(given.agent)
     except TunnelError as error:
         print(error, file=sys.stderr)
         return 2

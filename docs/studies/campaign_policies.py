@@ -21,11 +21,11 @@ import numpy as np
 import polars as pl
 from scipy.stats import binom
 
+from docs.studies.policies import POLICIES, Policy, run_campaign
 from identification.estimate import PARAMETERS
 from identification.show.style import COLOURS, MARKERS, WIDTH, figure, grid, log_axis, save, styled
 from identification.statistics import Proportion
 from tunnel_lab.envs.campaign import CampaignEnv, reached
-from tunnel_lab.envs.policies import POLICIES, Policy, run_campaign
 from tunnel_lab.envs.session import answers, probabilities
 from tunnel_lab.experiments.experiment import RESULTS, Done, Experiment, parquet, results_of
 from tunnel_lab.experiments.runner import crew

@@ -26,10 +26,11 @@ from gymnasium.wrappers.vector import NormalizeObservation
 import tunnel_sim.envs  # noqa: F401  registers the environments
 from docs.studies.campaign_agent import CAMPAIGNS, TRAINING, make, model_of
 from docs.studies.campaign_policies import replaced
+from docs.studies.policies import greedy, scripted
+from docs.studies.resonant import Resonant
+from docs.studies.trained_policy import features, trained
 from identification.show.quantity import INTERVAL
 from identification.show.style import COLOURS, MARKERS, WIDTH, figure, grid, save, styled
-from tunnel_lab.envs.excitation import Resonant
-from tunnel_lab.envs.policies import greedy, scripted, trained
 from tunnel_sim.files.writing import write_whole
 from tunnel_sim.vocabulary.record import Array
 
@@ -55,7 +56,7 @@ SETTINGS: dict[str, Any] = {
     "learning_rate": 1e-3,
     "policy_kwargs": {"net_arch": [64, 64], "log_std_init": -0.5},
 }
-"""Of PPO for ``FreeDecay-v0``, where they differ from those of the packaged agent."""
+"""Of PPO for ``FreeDecay-v0``, where they differ from those of the stored agent."""
 RUNS = 16  # in parallel
 SEEDS = (0, 1)
 SWING = radians(20.0)  # rad, amplitude of the hand-written policy
@@ -70,7 +71,7 @@ LENGTHS = {"FreeDecay-v0": 150_000, "Campaign-v0": 32_000}
 STEP = {"FreeDecay-v0": "control periods", "Campaign-v0": "runs"}
 EPISODES = {"FreeDecay-v0": 48, "Campaign-v0": 50}
 TRAINED = "trained"
-PACKAGED = "packaged agent"
+STORED = "stored agent"
 NAME = "train-an-agent-curves"
 
 
@@ -192,7 +193,7 @@ def untrained() -> list[Point]:
     rules = [("free decay", alone), *driven, ("resonant by spring", by_spring)]
     for name, begin in rules:
         found.append(point("FreeDecay-v0", name, 0, 0, play_runs(each, begin)))
-    for name, rule in (("scripted", scripted), ("greedy", greedy), (PACKAGED, trained)):
+    for name, rule in (("scripted", scripted), ("greedy", greedy), (STORED, trained)):
         returns = play_campaigns(lambda env: rule(env.known))  # noqa: B023  called within the loop
         found.append(point("Campaign-v0", name, 0, 0, returns))
     return found
@@ -248,8 +249,6 @@ def train(environment: str, seed: int, steps: int) -> list[Point]:
 
 def features_of(env: Any) -> Array:
     """The features for the agent of a campaign."""
-    from tunnel_lab.envs.policies import features
-
     return features(env.known.observation())
 
 

@@ -11,7 +11,7 @@ from docs.studies.campaign_agent import fill
 from docs.studies.learning_curves import curves, from_csv
 from docs.studies.learning_curves import fill as filled_with_curves
 from docs.studies.quotes import printed, quotes
-from tunnel_lab.envs.policies import packaged_agent
+from docs.studies.trained_policy import stored_agent
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE = DOCS / "how-to" / "train-an-agent.md"
@@ -60,9 +60,9 @@ def test_the_curves_are_drawn() -> None:
 
 
 def test_the_first_example_prints_what_is_shown(tmp_path: Path) -> None:
-    """And an agent read from a file, here the packaged one, chooses the same runs."""
+    """And an agent read from a file, here the stored one, chooses the same runs."""
     first, reading, *_ = quotes(PAGE.read_text("utf-8"))
-    own = packaged_agent()
+    own = stored_agent()
     (tmp_path / "agent.safetensors").write_bytes(own.to_bytes())
     assert printed([first.source, reading.source], tmp_path) == [first.shown, "7 runs, 6.5 nats\n"]
     assert "trained: 7 runs, " in first.shown

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
+from docs.studies import policies
 from docs.studies.campaign_policies import (
     CONTESTS,
     SEEDS,
@@ -19,9 +20,8 @@ from docs.studies.campaign_policies import (
     play,
     to_csv,
 )
-from tunnel_lab.envs import policies
+from docs.studies.policies import best_rivals, expected_gain, greedy, run_campaign, scripted, separating
 from tunnel_lab.envs.campaign import CampaignEnv
-from tunnel_lab.envs.policies import best_rivals, expected_gain, greedy, run_campaign, scripted, separating
 
 DOCS = Path(__file__).parents[4] / "docs"
 SMALL = {

@@ -12,18 +12,17 @@ import pytest
 
 from docs.studies.campaign_agent import train, write_score
 from docs.studies.campaign_policies import SEEDS, from_csv, median_interval
-from tunnel_lab.envs.campaign import CampaignEnv
-from tunnel_lab.envs.policies import (
+from docs.studies.policies import run_campaign, scripted
+from docs.studies.trained_policy import (
     FEATURES,
     Agent,
     features,
     menu_text,
-    packaged_agent,
     read_agent,
-    run_campaign,
-    scripted,
+    stored_agent,
     trained,
 )
+from tunnel_lab.envs.campaign import CampaignEnv
 from tunnel_sim.vocabulary.errors import TunnelError
 
 DOCS = Path(__file__).parents[4] / "docs"
@@ -96,10 +95,10 @@ def test_another_menu_is_refused():
         trained(env.known)
 
 
-def test_the_packaged_agent_is_small_and_plays_better_than_the_script():
+def test_the_stored_agent_is_small_and_plays_better_than_the_script():
     env = CampaignEnv()
-    assert len(packaged_agent().to_bytes()) < 40_000
-    assert json.loads(packaged_agent().menu)["wind_speeds"] == list(env.conditions.menu.wind_speeds)
+    assert len(stored_agent().to_bytes()) < 40_000
+    assert json.loads(stored_agent().menu)["wind_speeds"] == list(env.conditions.menu.wind_speeds)
     times = {
         policy: np.array([run_campaign(env, policy, seed=seed)["rig_time_s"] for seed in range(100, 110)])
         for policy in (scripted, trained)
@@ -146,7 +145,7 @@ def test_episodes_of_the_score_are_played_again():
 
     written = rows("how-to/train-an-agent.csv", "trained")
     for seed in (0, 1):
-        row = play("identification", "trained", seed)
+        row = play("identification", "trained", seed, trained)
         assert (row.runs, row.rig_time_s, row.reached) == (
             written[seed].runs, written[seed].rig_time_s, written[seed].reached
         )  # fmt: skip

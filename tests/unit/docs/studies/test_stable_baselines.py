@@ -15,7 +15,7 @@ ACTIONS = np.zeros((2, 2), dtype=np.float32)
 
 
 def bridged(native, **options):
-    from tunnel_sim.envs.stable_baselines import BaselinesVecEnv  # loads torch
+    from docs.studies.stable_baselines import BaselinesVecEnv  # loads torch
 
     return BaselinesVecEnv(native, **options)
 

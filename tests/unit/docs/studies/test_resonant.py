@@ -4,8 +4,8 @@ import gymnasium
 import numpy as np
 import pytest
 
+from docs.studies.resonant import Resonant
 from tests.marks import slow
-from tunnel_lab.envs.excitation import Resonant
 from tunnel_sim.envs import EnvError
 from tunnel_sim.envs.episode_conditions import FreeDecayConfig
 

@@ -6,12 +6,7 @@ do not draw random numbers.
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
-from functools import cache
-from importlib import resources
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -20,18 +15,11 @@ from diagnosis.findings.next_run import planned_run, separation
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.search.study import Study
 from identification.campaign.belief import expected_belief, information_gain
-from tunnel_lab.envs.menu import Menu, RunChoice, refusal
+from tunnel_lab.envs.menu import RunChoice
 from tunnel_lab.envs.session import Knowledge
-from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.record import Array
 
 Action = tuple[int, int, int, int]
 Policy = Callable[[Knowledge], Action]
-FEATURES = 20
-LAYERS = 3
-PACKAGED = "campaign-agent.safetensors"
-_PAIRS = np.triu_indices(4, 1)
-_SMALLEST = 1e-12  # least standard deviation: keeps its logarithm finite
 
 
 def scripted(known: Knowledge) -> Action:
@@ -139,103 +127,5 @@ def run_campaign(
     return dict(info)
 
 
-def features(observation: Mapping[str, Array]) -> Array:
-    """The observation of the identification preset in numbers of order one to ten, shape (20,).
-
-    Estimate [SI], ln of its four standard deviations, their six correlations, the last run [SI], runs made and rig
-    time [s].
-    """
-    covariance = observation["covariance"].reshape(4, 4)
-    std = np.sqrt(np.maximum(np.diag(covariance), _SMALLEST**2))
-    correlations = (covariance / np.outer(std, std))[_PAIRS]
-    runs = observation["last_run"], observation["progress"]
-    return np.concatenate((observation["estimate"], np.log(std), correlations, *runs))
-
-
-@dataclass(frozen=True, eq=False)
-class Agent:
-    """A network and its normalisation.
-
-    Args:
-        mean: of the features, shape (20,).
-        variance: of the features, shape (20,).
-        layers: weights and biases, shapes (outputs, inputs) and (outputs,).
-        menu: menu of the training, in the format of `menu_text`.
-    """
-
-    mean: Array
-    variance: Array
-    layers: tuple[tuple[Array, Array], ...]
-    menu: str
-
-    def action(self, observation: Mapping[str, Array], menu: Menu) -> Action:
-        """The run that the agent chooses after an observation.
-
-        Raises:
-            TunnelError: when the menu differs from the menu of the training.
-        """
-        if menu_text(menu) != self.menu:
-            remedy = "use the menu of the identification preset, or train an agent with yours"
-            raise refusal("the agent was trained with another menu", remedy)
-        spread = np.sqrt(self.variance + 1e-8)  # as in NormalizeObservation
-        values = (features(observation) - self.mean) / spread
-        for weight, bias in self.layers[:-1]:
-            values = np.tanh(weight @ values + bias)
-        weight, bias = self.layers[-1]
-        parts = np.split(weight @ values + bias, np.cumsum(menu.shape)[:-1])
-        spring, speed, angle, duration = (int(np.argmax(part)) for part in parts)
-        return spring, speed, angle, duration
-
-    def to_bytes(self) -> bytes:
-        """As safetensors, in single precision."""
-        from safetensors.numpy import save
-
-        tensors = {"mean": self.mean, "variance": self.variance}
-        for place, (weight, bias) in enumerate(self.layers):
-            tensors |= {f"weight.{place}": weight, f"bias.{place}": bias}
-        return save(
-            {name: np.ascontiguousarray(value, dtype=np.float32) for name, value in tensors.items()},
-            metadata={"menu": self.menu},
-        )
-
-
-def menu_text(menu: Menu) -> str:
-    """A menu as one line of JSON."""
-    return json.dumps(asdict(menu))
-
-
-def read_agent(path: Path) -> Agent:
-    """An agent from a file written by `Agent.to_bytes`."""
-    from safetensors import SafetensorError, safe_open
-
-    try:
-        with safe_open(path, framework="numpy") as file:
-            names = file.keys()
-            tensors: dict[str, Any] = {name: file.get_tensor(name).astype(np.float64) for name in names}
-            menu = (file.metadata() or {})["menu"]
-        layers = tuple((tensors[f"weight.{place}"], tensors[f"bias.{place}"]) for place in range(LAYERS))
-        return Agent(tensors["mean"], tensors["variance"], layers, menu)
-    except (OSError, SafetensorError, KeyError) as error:
-        raise TunnelError(
-            "is not an agent", where=str(path), remedy="give a file that docs/studies/campaign_agent.py wrote"
-        ) from error
-
-
-@cache
-def packaged_agent() -> Agent:
-    """The agent in the package, trained for the identification preset."""
-    with resources.as_file(resources.files("tunnel_lab") / "data" / PACKAGED) as path:
-        return read_agent(path)
-
-
-def trained(known: Knowledge) -> Action:
-    """The policy of the packaged agent; for the identification preset.
-
-    Raises:
-        TunnelError: when the menu is not that preset's.
-    """
-    return packaged_agent().action(known.observation(), known.conditions.menu)
-
-
-POLICIES: dict[str, Policy] = {one.__name__: one for one in (scripted, greedy, separating, trained)}
+POLICIES: dict[str, Policy] = {one.__name__: one for one in (scripted, greedy, separating)}
 """By name."""
