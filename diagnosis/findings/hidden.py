@@ -116,9 +116,9 @@ def hidden_effects(fit: Fit, starts: Starts, left: Sequence[Array] | None = None
 def _confirmed(fit: Fit, start: StartingPoint, found: _Size, reach: float) -> _Size | None:
     """The size at which a refit is ``reach`` above the least −2 ln L, with its changes of the coefficients.
 
-    A refit within a quarter of the distance confirms a size. Elsewhere the size follows from the rise, which grows
-    with the square of the unabsorbed change, and from the sizes already refitted. An effect with a phase or an
-    instant in every run keeps its size by linear theory: its change is a sum of lines or steps, linear in the size.
+    A refit within a tenth of the rise confirms a size, and so does one beyond it that is close to one within.
+    Elsewhere the next size follows from those already refitted (`_nearer`). An effect with a phase or an instant in
+    every run keeps its size by linear theory: its change is a sum of lines or steps, linear in the size.
 
     Returns:
         None where no refit confirms a size, or the runs exclude no size at all.
@@ -131,32 +131,48 @@ def _confirmed(fit: Fit, start: StartingPoint, found: _Size, reach: float) -> _S
     size = float(
         np.clip(found.size, least, greatest)
     )  # a multiple of a trial may be rounded beyond its bound
-    inside = outside = 0.0  # sizes below and above the limit
+    known: list[tuple[float, float]] = []
     along = np.zeros_like(fit.point.common)  # change of the other parameters per unit of the size
     for _ in range(_REFITS):
         again = _held(fit, start, size, fit.point.common + along * size)
         if again is None:
             return None
-        rise = again.unlikelihood - limit
-        if abs(rise - reach) <= _CONFIRMED * reach:
+        rise = (again.unlikelihood - limit) / reach
+        # refits beside chance differences may end in several minima, so the rise may have a step
+        within = max((abs(one) for one, root in known if root < 1.0), default=0.0)
+        if abs(rise - 1.0) <= _CONFIRMED or (rise > 1.0 and abs(size) < _CLOSE * within):
             return replace(
                 found,
                 size=size,
                 moves=_changes(fit, start, np.insert(again.point.common, start.scaled, size)),
             )
-        if rise < reach:
-            inside, along = size, (again.point.common[: along.size] - fit.point.common) / size
-        else:
-            outside = size
-        power = 0.25 if start.second_order else 0.5
-        further = size * float(np.clip((reach / max(rise, 1e-3 * reach)) ** power, 1.0 / _WIDEST, _WIDEST))
-        if inside and outside and not abs(inside) < abs(further) < abs(outside):
-            further = float(np.sign(size) * np.sqrt(inside * outside))
-        further = float(np.clip(further, least, greatest))
+        if rise < 1.0:
+            along = (again.point.common[: along.size] - fit.point.common) / size
+        known.append((size, float(max(rise, _LEAST_RISE) ** (0.25 if start.second_order else 0.5))))
+        further = float(np.clip(_nearer(known), least, greatest))
         if further == size:  # the whole range is allowed
             return None
         size = further
     return None
+
+
+def _nearer(known: Sequence[tuple[float, float]]) -> float:
+    """The size at which the root of the rise is 1, from sizes and their roots, by the secant.
+
+    The rise is a parabola about the likeliest size, so its root is a line.
+    """
+    size, root = known[-1]
+    inside = max((one for one in known if one[1] < 1.0), key=lambda one: abs(one[0]), default=None)
+    outside = min((one for one in known if one[1] > 1.0), key=lambda one: abs(one[0]), default=None)
+    if inside is not None and outside is not None:
+        (low, below), (high, above) = inside, outside
+        same = len(known) > 2 and (known[-1][1] < 1.0) == (known[-2][1] < 1.0)  # the secant stalls
+        share = 0.5 if same else (1.0 - below) / (above - below)
+        return low + share * (high - low)
+    before, earlier = known[-2] if len(known) > 1 else (0.0, 0.0)
+    slope = (root - earlier) / (size - before) * np.sign(size)
+    further = size + np.sign(size) * (1.0 - root) / slope if slope > 0.0 else size * _WIDEST
+    return float(np.clip(further / size, 1.0 / _WIDEST, _WIDEST)) * size
 
 
 def _held(fit: Fit, start: StartingPoint, size: float, common: Array) -> Fit | None:
@@ -170,7 +186,7 @@ def _held(fit: Fit, start: StartingPoint, size: float, common: Array) -> Fit | N
     problem = replace(problem, fixed=(*problem.fixed, (name, size)), scatter=fit.problem.scatter)
     own = np.delete(start.point.common, start.scaled)[common.size :]
     point = Point(np.concatenate([common, own]), fit.point.per_run.copy())
-    return try_fit(problem, point, base=fit, max_iterations=_STEPS)
+    return try_fit(problem, point, base=fit, tolerance=_TOLERANCE, max_iterations=_STEPS)
 
 
 def _changes(fit: Fit, start: StartingPoint, there: Array) -> Array:
@@ -189,10 +205,11 @@ def _changes(fit: Fit, start: StartingPoint, there: Array) -> Array:
 
 _REFITS = 10
 _STEPS = 10  # of a refit, which starts at the fit
-_CONFIRMED = (
-    0.1  # greatest distance of a refit from the limit, as a share of that of the limit from the least
-)
+_TOLERANCE = 1e-6  # of its χ², so that rises of a few units compare
+_CONFIRMED = 0.1  # greatest distance of a rise from that of the limit, as a share of it
+_CLOSE = 1.1  # greatest factor from a size within the limit to one beyond it that confirms it
 _WIDEST = 10.0  # greatest factor between two sizes that are refitted
+_LEAST_RISE = 1e-3  # as a share of that of the limit
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,12 +256,12 @@ def _within(
     seen = [_profiled(fit, start, part, influence, least_share) for part in parts]
     if any(one is None for one in seen):
         return None
-    lefts, moves = zip(*(one for one in seen if one is not None), strict=True)
-    # left(k) = k u + k² w in multiples k of the size, and the moves alike
+    changes, lefts, moves = zip(*(one for one in seen if one is not None), strict=True)
+    # change(k) = k u + k² w in multiples k of the size, and what is left of it and the moves alike
     powers = np.array([[part, part**2][: len(parts)] for part in parts])
-    terms = np.linalg.solve(powers, np.array(lefts))
-    slopes = np.linalg.solve(powers, np.array(moves))
-    along, gram = terms @ np.concatenate(fit.residuals), terms @ terms.T
+    terms, left, slopes = (np.linalg.solve(powers, np.array(of)) for of in (changes, lefts, moves))
+    # with the change itself, so that the prior of the runs' deviations counts as well
+    along, gram = terms @ np.concatenate(fit.residuals), terms @ left.T
     rise: Array = np.zeros(5)  # χ²(k) − χ²(0), from the fourth power of k down
     for i in range(len(terms)):
         rise[3 - i] -= 2.0 * along[i]
@@ -295,15 +312,15 @@ def _moved(fit: Fit, start: StartingPoint, there: Array) -> Array:
 
 def _profiled(
     fit: Fit, start: StartingPoint, part: float, influence: Sequence[Array], least_share: float
-) -> tuple[Array, Array] | None:
-    """The change of all readings by a part of an effect's size that the fit cannot absorb, and its moves.
+) -> tuple[Array, Array, Array] | None:
+    """The change of all readings by a part of an effect's size, what the fit cannot absorb of it, and its moves.
 
     The other parameters are moved first. Linear theory alone would absorb to first order what they absorb exactly,
     as Cnβ and Cnr absorb an offset of the only wind speed.
 
     Returns:
-        The change, scaled, shape (n,), and the moves of the coefficients, shape (coefficients,); None where the
-        unabsorbed share of the change is at most ``least_share``.
+        The change and the rest, scaled, each of shape (n,), and the moves of the coefficients, shape
+        (coefficients,); None where the unabsorbed share of the change is at most ``least_share``.
     """
     assert start.scaled is not None
     common = start.point.common.copy()
@@ -323,4 +340,6 @@ def _profiled(
         return None
     moved = moved - sum((c @ i for c, i in zip(change, influence, strict=True)), np.zeros_like(moved))
     left = np.concatenate(project_out(fit, change))
-    return None if float(np.linalg.norm(left)) <= least_share * whole else (left, moved)
+    if float(np.linalg.norm(left)) <= least_share * whole:
+        return None
+    return np.concatenate(change), left, moved
