@@ -16,15 +16,20 @@ def disturbed_words(found: Disturbance, *, no_gap: bool) -> str:
         no_gap: whether the runs show no gap without the disturbance.
     """
     run, kept, at, begins = found.run, found.kept_until_s, found.at_s, found.kept_from_s
+    if found.used:
+        what = (
+            f"was disturbed at {at:.4g} s"
+            if at is not None
+            else "does not move as the others do at its start"
+        )
+        why = "the other runs do not determine the model"
+        return f"Run {run} {what}. It is used nevertheless, because {why}."
     if at is None:
         if begins is not None:
             part = "Without that part there is no gap, so it" if no_gap else "That part"
             return f"Run {run} does not move as the others do before {begins:.4g} s. {part} is not used."
         whole = "Without it there is no gap, so it" if no_gap else "It"
         return f"Run {run} differs from the others. {whole} is not used."
-    if found.used:
-        why = "the other runs do not determine the model"
-        return f"Run {run} was disturbed at {at:.4g} s. It is used nevertheless, because {why}."
     unused = "it is not used" if kept is None else f"its readings from {kept:.4g} s on are not used"
     if begins is not None:
         unused = f"its readings before {begins:.4g} s are not used"

@@ -24,7 +24,7 @@ from diagnosis.search.odd_run import DISTURBED_FEWEST, DISTURBED_KEPT, DISTURBED
 from diagnosis.search.prepared import Prepared, prepared_and_tested
 from diagnosis.search.scatter import scattered
 from diagnosis.settings import SelectionSettings, Settings
-from diagnosis.where.jumps import Jumps, jumps
+from diagnosis.where.jumps import Jumps, jumps, starts
 from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -93,11 +93,27 @@ def disturbances(measured: Campaign, nominal: Fit) -> tuple[Disturbance, ...]:
         nominal: fit of the nominal model to the similar campaign.
     """
     similarity, chosen = nominal.problem.data.similarity, nominal.settings.selection
-    runs = {run.id: run for run in nominal.problem.data.runs}
-    index = {run.id: place for place, run in enumerate(nominal.problem.data.runs)}
-    origins = {run.id: float(run.record.time_s[0]) + run.clock_s for run in measured.runs}
+    data, clocks = nominal.problem.data, {run.id: run.record.time_s[0] + run.clock_s for run in measured.runs}
+    index = {run.id: place for place, run in enumerate(data.runs)}
+    found: dict[str, Disturbance] = {}
+
+    def clock(name: str, time: float) -> float:
+        """A time since the start of a run's fitted part on the clock of its file, s."""
+        return float(clocks[name]) + similarity.own(data.runs[index[name]].start + time, "s")
+
+    def kept_from(name: str, time: float) -> float | None:
+        """That clock, where enough of the run follows to be used; else None."""
+        run, frequency = data.runs[index[name]], resonance(nominal, index[name])
+        span = run.reading.size * run.interval
+        follows = (span - time) * frequency >= DISTURBED_KEPT and time < _EARLY * span
+        return clock(name, time) if follows else None
+
+    first_cycles = {one.id: one for one in starts(nominal)}
+    for name, p_value in beyond_the_others(list(first_cycles.values()), chosen):
+        held = first_cycles[name]
+        free = float(held.time[held.drop > 1.0][-1]) + 1.0 / resonance(nominal, index[name])
+        found[name] = Disturbance(name, None, None, p_value, kept_from_s=kept_from(name, free))
     seen = {one.id: one for one in jumps(nominal)}
-    found = []
     for name, p_value in beyond_the_others(list(seen.values()), chosen):
         one = seen[name]
         most = int(np.argmax(one.drop))
@@ -105,17 +121,13 @@ def disturbances(measured: Campaign, nominal: Fit) -> tuple[Disturbance, ...]:
         first, frequency = most, resonance(nominal, index[name])
         while first > 0 and _clear(float(one.chance[first - 1]), chosen):
             first -= 1
-        last = min(float(one.time[first]), float(one.time[most]) - 1.0 / frequency)
-        begun = origins[name] + similarity.own(runs[name].start, "s")
-        at, until = (begun + similarity.own(time, "s") for time in (float(one.time[most]), last))
-        kept = until if last * frequency >= DISTURBED_KEPT else None
-        after = float(one.time[most]) + 1.0 / frequency
-        span = runs[name].reading.size * runs[name].interval
+        at = float(one.time[most])
+        last = min(float(one.time[first]), at - 1.0 / frequency)
+        kept = clock(name, last) if last * frequency >= DISTURBED_KEPT else None
         # of a start that is not free, as of a hand that holds the body, the rest is used
-        begins = kept is None and (span - after) * frequency >= DISTURBED_KEPT and after < _EARLY * span
-        starts = begun + similarity.own(after, "s") if begins else None
-        found.append(Disturbance(name, at, kept, p_value, kept_from_s=starts))
-    return tuple(sorted(found, key=lambda one: one.run))
+        begins = None if kept is not None else kept_from(name, at + 1.0 / frequency)
+        found[name] = Disturbance(name, clock(name, at), kept, p_value, kept_from_s=begins)
+    return tuple(sorted(found.values(), key=lambda one: one.run))
 
 
 def beyond_the_others(runs: Sequence[Jumps], chosen: SelectionSettings) -> list[tuple[str, float]]:

@@ -1,9 +1,10 @@
-"""Jumps of a run's oscillation at an instant, from its reading alone.
+"""Jumps of a run's oscillation at an instant, and starts that are not free, from its reading alone.
 
 A blow changes angle and rate of a free decay at once. Causes change its amplitude, frequency and harmonics along
 the decay, but smoothly. Around every instant, the reading over a few cycles is therefore fitted by smooth
 harmonics of the run's own oscillation, whose slope may change there, and then with a jump of the oscillation as
-well. No model of the rig is needed, so a large gap from any cause does not hide a blow.
+well. No model of the rig is needed, so a large gap from any cause does not hide a blow. A body that is held when
+the record starts departs from the same harmonics, continued to the start.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
+from scipy.special import fdtrc
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import linear_coefficients, resonance
@@ -26,7 +28,17 @@ _FEWEST = 6.0  # cycles of a run in which jumps are sought
 _SMOOTH, _SLOW = 4, 2  # orders of the slow change of amplitude and phase, the first time and then
 _ROUNDS = 3  # of finding that change, each from the previous one
 _COLUMNS = 23  # of `_Oscillation.around`
+_OF_JUMPS = [
+    5,
+    6,
+    10,
+    11,
+    20,
+    21,
+]  # of these, what is not continued to a start: fast changes, kinks and the jump
 _AT_ONCE = 200  # instants, which bounds the memory
+_FREE = 0.015  # departure of the start over the swing, root mean square, that every run may have
+_HELD = 3  # cycles in which a start that is not free is sought
 _CLEAR = 4.0  # noise standard deviations of an amplitude that shows it
 _QUARTILE = 0.575  # the lower quartile of χ² with two degrees of freedom
 
@@ -159,16 +171,46 @@ def jumps(fit: Fit) -> list[Jumps]:
     return [found for index in range(len(fit.problem.data.runs)) if (found := _of_run(fit, index))]
 
 
+def starts(fit: Fit) -> list[Jumps]:
+    """The departure of the first cycles of every free decay from the harmonics of the three that follow each.
+
+    Args:
+        fit: as in `jumps`.
+
+    Returns:
+        As jumps at the start of these cycles. Causes that act at large amplitudes make all runs depart by a similar
+        share of the swing, so the drop is the power of the departure in units of `_FREE` of the swing.
+    """
+    found = []
+    for index, run in enumerate(fit.problem.data.runs):
+        motion = _motion(fit, index)
+        if motion is None:
+            continue
+        begins = np.arange(min(float(_HELD), motion.cycles[-1] - 2.0 * _HALF))
+        columns, count = motion.around(begins + _HALF)
+        seen = [_departure(one[:rows]) for one, rows in zip(columns, count.tolist(), strict=True)]
+        share, chance = np.array(seen).T
+        found.append(Jumps(run.id, np.interp(begins, motion.cycles, motion.time), share / _FREE**2, chance))
+    return found
+
+
+def _departure(columns: Array) -> tuple[float, float]:
+    """The departure of the first cycle of a window, beyond its noise, as a share of the power, and its chance."""
+    since = _HALF * columns[:, 1]
+    columns = np.delete(columns, _OF_JUMPS, axis=1)
+    later = columns[since >= 1.0 - _HALF]
+    left, whole = (float(_triangle(part[None])[0, -1, -1] ** 2) for part in (later, columns))
+    early, freedom = len(columns) - len(later), max(len(later) - columns.shape[1] + 1.0, 1.0)
+    level, departure = max(left / freedom, 1.0), (whole - left) / early
+    share = max(departure - level, 0.0) / float(np.var(columns[:, -1]))
+    return share, float(fdtrc(early, freedom, departure / level))
+
+
 def _of_run(fit: Fit, index: int) -> Jumps | None:
-    run, frequency = fit.problem.data.runs[index], resonance(fit, index)
-    if run.drive is not None or run.reading.size * run.interval * frequency < _FEWEST:
+    run, motion = fit.problem.data.runs[index], _motion(fit, index)
+    if motion is None:
         return None
-    if run.interval * frequency * _ROWS > 2.0:  # too few readings in a cycle for its harmonics
-        return None
-    motion = _Oscillation.of(fit, index)
     cycles = motion.cycles
-    if not cycles[-1] > _FEWEST or not np.all(np.diff(cycles) > 0.0):
-        return None
     instants = np.arange(_HALF, cycles[-1] - _HALF, _APART)
     parts = np.array_split(instants, 1 + instants.size // _AT_ONCE)
     drop, left, freedom = np.concatenate([_compared(motion, part) for part in parts], axis=1)
@@ -177,6 +219,18 @@ def _of_run(fit: Fit, index: int) -> Jumps | None:
     # the tail of F with two degrees of freedom
     chance = (1.0 + scaled / freedom) ** (-0.5 * freedom)
     return Jumps(run.id, np.interp(instants, cycles, motion.time), scaled, chance)
+
+
+def _motion(fit: Fit, index: int) -> _Oscillation | None:
+    """The oscillation of a run; None where it is driven, too short, or read too rarely for its harmonics."""
+    run, frequency = fit.problem.data.runs[index], resonance(fit, index)
+    if run.drive is not None or run.reading.size * run.interval * frequency < _FEWEST:
+        return None
+    if run.interval * frequency * _ROWS > 2.0:
+        return None
+    motion = _Oscillation.of(fit, index)
+    cycles = motion.cycles
+    return motion if cycles[-1] > _FEWEST and np.all(np.diff(cycles) > 0.0) else None
 
 
 def _triangle(columns: Array) -> Array:

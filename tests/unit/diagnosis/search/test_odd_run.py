@@ -16,7 +16,7 @@ from diagnosis import diagnose
 from diagnosis.findings.next_steps import next_steps
 from diagnosis.findings.verdict import headline
 from diagnosis.result import Diagnosis
-from diagnosis.search.disturbed import undisturbed
+from diagnosis.search.disturbed import disturbances, undisturbed
 from diagnosis.search.investigate import investigate, nominal_study
 from diagnosis.search.odd_run import replaceable
 from tests.marks import slow
@@ -52,6 +52,11 @@ def filtered(yaw: Array) -> Array:
     return np.asarray(lfilter(numerator, denominator, yaw, zi=lfilter_zi(numerator, denominator) * yaw[0])[0])
 
 
+def settled(yaw: Array) -> Array:
+    """Low-passed, from a second after the release on, so that the filter's transient is over."""
+    return filtered(yaw)[round(1.0 / INTERVAL) :]
+
+
 def clipped(yaw: Array) -> Array:
     return np.clip(yaw, -0.2, 0.2)
 
@@ -78,10 +83,24 @@ def test_of_a_held_start_the_free_motion_is_kept(plain: Campaign) -> None:
     assert kept.record.time_s[0] >= one.kept_from_s
 
 
+def test_a_hold_of_more_than_a_cycle_is_left_out_whole(plain: Campaign) -> None:
+    """Beside a cause, which hides a run that differs as a whole."""
+    friction = campaign(effect_from("coulomb_friction", {"friction_moment": 0.003}), duration=8.0)
+
+    def still(yaw: Array) -> Array:
+        return np.concatenate([np.full(round(0.8 / INTERVAL), yaw[0]), yaw])
+
+    for data in (plain, friction):
+        (one,) = disturbances(spoilt(data, "r2", still), nominal(spoilt(data, "r2", still)))
+        assert one.run == "r2"
+        assert one.kept_from_s is None or one.kept_from_s >= 0.8
+    assert disturbances(friction, nominal(friction)) == ()
+
+
 def test_a_run_alone_at_its_spring_or_without_wind_is_not_odd(plain: Campaign) -> None:
     kept = replace(plain, runs=(*plain.runs[:3], plain.runs[4]))
     assert replaceable(nominal(kept).problem.data) == [1, 2]
-    assert nominal_study(spoilt(kept, "r5", filtered), FEW).disturbed == ()
+    assert nominal_study(spoilt(kept, "r5", settled), FEW).disturbed == ()
 
 
 def test_a_cause_of_all_runs_accuses_none() -> None:
