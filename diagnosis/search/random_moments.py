@@ -36,7 +36,7 @@ from diagnosis.search.process_noise import (
 )
 from diagnosis.search.random_spectra import SOURCES, MomentSource
 from diagnosis.search.runs_in_view import RunsInView
-from diagnosis.search.scatter import with_likeliest_widths
+from diagnosis.search.scatter import differing, with_likeliest_widths
 from diagnosis.search.steady_noise import is_a_line, is_steady_noise
 from diagnosis.search.weigh import FittedSet, log_weight
 from tunnel_sim.effects import Effect
@@ -108,7 +108,7 @@ def weigh_random_moments(view: RunsInView, hypotheses: Sequence[Hypothesis]) -> 
     if scale.greatest(best, repeating=False) <= scale.weight(best):
         return []
     named = [source for source in SOURCES if any(source.may_be(kind) for kind in view.prepared.kinds)]
-    acting = [source for source in named if _may_act(source, best, scale)]
+    acting = [source for source in named if _may_act(source, best, scale, view.prepared.kinds)]
     found = list[_Beside]()
     for source in sorted(acting, key=lambda one: _explained(one, best)[0]) if len(acting) > 1 else acting:
         if all(one.cost_from(source) < one.cost + ALIKE_WITHIN for one in found):
@@ -147,7 +147,7 @@ class _Beside:
                 top, exchanges = further[0], exchanges | _exchanges(further)
             seen = _seen_in(top, view.base.problem.data)
             steady = [one for one in random_moments(seen.fit, source) if is_steady_noise(one, chosen)]
-            shown = [one for one in steady if _shown_apart(one, source, seen.fit)]
+            shown = [one for one in steady if _shown_apart(one, source, seen.fit, view.prepared.kinds)]
             process = likeliest(shown, chosen)
             if process is not None and _is_random(process, source, seen.fit):
                 sets = (top, *_exchanged(top, exchanges, view.able))
@@ -243,7 +243,7 @@ def without_the_random_moment(
     return list(found.values())
 
 
-def _may_act(source: MomentSource, best: Hypothesis, scale: Scale) -> bool:
+def _may_act(source: MomentSource, best: Hypothesis, scale: Scale, kinds: Sequence[type[Effect]]) -> bool:
     """Whether a random moment of a source may be the residual of the best set.
 
     It may if perfect agreement of the wind-on runs would raise the set's weight, or if the residual is steady
@@ -263,7 +263,7 @@ def _may_act(source: MomentSource, best: Hypothesis, scale: Scale) -> bool:
             return not is_no_noise(best.fit)
     chosen = best.fit.settings.moment
     process = likeliest(random_moments(best.fit, source), chosen)
-    if process is None or not _shown_apart(process, source, best.fit):
+    if process is None or not _shown_apart(process, source, best.fit, kinds):
         return False
     if source.in_every_run and (is_of_reading(best.fit, process) or is_a_line(best.fit, process)):
         return False
@@ -277,12 +277,27 @@ def _is_random(process: ProcessNoise, source: MomentSource, fitted: Fit) -> bool
     return not follows_the_motion(fitted, process.runs) and not obeys_a_law(fitted, source)
 
 
-def _shown_apart(process: ProcessNoise, source: MomentSource, fitted: Fit) -> bool:
-    """Whether the runs in which no other source acts show a random moment too; true where there are none."""
-    others = [one for one in SOURCES if one is not source]
-    apart = {run.id for run in fitted.problem.data.runs if not any(one.acts(run) for one in others)}
-    drops = [drop for run, drop in zip(process.runs, process.drops.tolist(), strict=True) if run in apart]
-    return not drops or acts_by(sum(drops), fitted.settings.moment)
+def _shown_apart(
+    process: ProcessNoise, source: MomentSource, fitted: Fit, kinds: Sequence[type[Effect]]
+) -> bool:
+    """Whether the runs in which no other source acts show a random moment too; true where there are none.
+
+    They must show it beside a spring and a damping of their own: a run that differs is no random motion.
+
+    Args:
+        kinds: the effects that may be named.
+    """
+    others, chosen = [one for one in SOURCES if one is not source], fitted.settings.moment
+    runs = fitted.problem.data.runs
+    apart = [place for place, run in enumerate(runs) if not any(one.acts(run) for one in others)]
+    ids = {runs[place].id for place in apart}
+    drops = [drop for run, drop in zip(process.runs, process.drops.tolist(), strict=True) if run in ids]
+    if not drops:
+        return True
+    if not acts_by(sum(drops), chosen):
+        return False
+    own = differing(fitted, apart, kinds)
+    return own is None or likeliest(random_moments(own, source), chosen) is not None
 
 
 def excess_elsewhere(fit: Fit, acts: Collection[str]) -> float:

@@ -116,6 +116,25 @@ def scattered(found: Fit, kinds: Sequence[type[Effect]]) -> Fit | None:
     return None if layered is None else with_likeliest_widths(layered)
 
 
+def differing(fitted: Fit, places: Sequence[int], kinds: Sequence[type[Effect]]) -> Fit | None:
+    """Some runs of a fit, refitted with deviations as wide as they may be; None where they may not differ.
+
+    Args:
+        places: of these runs.
+        kinds: the effects that may be named.
+    """
+    problem, point = without_deviations(fitted)
+    runs = tuple(problem.data.runs[place] for place in places)
+    problem = replace(problem, data=problem.data.with_runs(runs))
+    usual_widths = tuple(usual(fitted, kind) for kind in may_scatter(kinds, problem.data))
+    if not usual_widths:
+        return None
+    own, start = with_deviations(problem, Point(point.common, point.per_run[list(places)]), usual_widths)
+    most = width_prior(own).most
+    scatter = tuple(one.as_wide_as(width) for one, width in zip(usual_widths, most, strict=True))
+    return try_fit(replace(own, scatter=scatter), start)
+
+
 def evident(fitted: Fit) -> Fit:
     """A fit with chance differences where its runs show them beyond those stated; else as stated."""
     scatter, known = fitted.problem.scatter, fitted.problem.data.repeatability
