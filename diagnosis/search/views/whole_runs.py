@@ -27,7 +27,7 @@ from diagnosis.search.scatter import (
     with_likeliest_widths,
     without_deviations,
 )
-from diagnosis.search.sets import Sets, prune
+from diagnosis.search.sets import Sets, prune, resolved
 from diagnosis.search.views.view import View
 from diagnosis.search.weigh import OF_MOTION, UNKNOWN, error_of_form, log_misfit, misfit_scale
 
@@ -143,9 +143,11 @@ class WholeRuns(View):
             if any(one.effects and self._explains(one) for one in beside.hypotheses):
                 return _with_moments(beside, clock)  # nothing remains for a random moment
         plain = _with_moments(found, clock)
-        if plain.weighed[0].effects != UNKNOWN or beside is None:
+        if plain.random:  # one that the runs refute must not hide differences between them
+            plain = resolved(plain)
+        if plain.weighed[0].effects != UNKNOWN or self.scattering is None:
             return plain
-        beside = _with_moments(beside, clock)
+        beside = _with_moments(beside or Sets(self._differing(None), (self._none,)), clock)
         return plain if beside.weighed[0].effects == UNKNOWN else beside
 
     def _beyond_reach(self, level: Sequence[Hypothesis]) -> list[float]:
@@ -165,7 +167,7 @@ class WholeRuns(View):
         None where the runs do not differ, or the fit fails.
         """
         if self.scattering is None or not one.effects:
-            return None if self.scattering is None else Hypothesis((), self.scattering, repeating=self.base)
+            return None if self.scattering is None else self._none
         if one not in self._fitted_beside:
             self._fitted_beside[one] = self._fitted_with_deviations(one, self.scattering.problem.scatter)
         return self._fitted_beside[one]
@@ -224,9 +226,7 @@ class WholeRuns(View):
             explained: the set that explains every run by itself, from which larger ones are grown; None: there is
                 none, and they are grown from scatter alone, as long as one nearly explains the runs.
         """
-        assert self.scattering is not None
-        none = Hypothesis((), self.scattering, repeating=self.base)
-        view = replace(self, base=self.scattering, unscattered=self.base, first=explained or none)
+        none, view = self._none, self._differing(explained)
 
         def unexplained(level: Sequence[Hypothesis]) -> bool:
             if explained is not None or not any(one.effects for one in level):
@@ -240,6 +240,21 @@ class WholeRuns(View):
             for one in filter(None, (none, *others, *grown)):
                 found[one.names] = of_more_weight(found.get(one.names), one, self._scattering_gap)
         return Sets(view, tuple(found.values()))
+
+    @property
+    def _none(self) -> Hypothesis:
+        """Chance differences between the runs alone."""
+        assert self.scattering is not None
+        return Hypothesis((), self.scattering, repeating=self.base)
+
+    def _differing(self, first: Hypothesis | None) -> Self:
+        """The view of runs that differ by chance.
+
+        Args:
+            first: the set that all others contain; None: the empty one.
+        """
+        assert self.scattering is not None
+        return replace(self, base=self.scattering, unscattered=self.base, first=first or self._none)
 
     def whole(self, hypothesis: Hypothesis) -> Hypothesis | None:
         """The set, unchanged."""
