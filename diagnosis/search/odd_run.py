@@ -173,8 +173,9 @@ def _explaining(sets: Sequence[Hypothesis], nominal: Fit, kinds: Sequence[type[E
     data, chosen, weighing = nominal.problem.data, nominal.settings.selection, nominal.settings.weighing
     if data.driven or len(data.runs) < DISTURBED_FEWEST:
         return []
-    tried = [one for one in _without_a_run(sets) if max(one.p_values.values()) < chosen.disturbed_rate]
-    gaps = {tuple(one.p_values): gap_left(one.beside.fit) for one in tried if not one.beside.effects}
+    refitted = list(_without_a_run(sets))
+    gaps = {tuple(one.p_values): gap_left(one.beside.fit) for one in refitted if not one.beside.effects}
+    tried = [one for one in refitted if max(one.p_values.values()) < chosen.disturbed_rate]
     found = [
         one
         for one in tried
@@ -334,7 +335,7 @@ def _expected(data: Data, noisy: Data) -> float:
 
 
 def _without_a_run(sets: Sequence[Hypothesis]) -> Iterator[OddRuns]:
-    """The sets without the runs that they explain least, the sets of least misfit first.
+    """The sets without the runs that they explain least: those of least misfit, or of fewest effects if by chance.
 
     Without such a run most of a set's misfit vanishes, by linear theory. The nominal model, the first of the sets,
     is fitted without each run without which a set is fitted.
@@ -351,7 +352,9 @@ def _without_a_run(sets: Sequence[Hypothesis]) -> Iterator[OddRuns]:
         order = [runs[place] for place in np.argsort(left) if left[place] < most]
         tried.append((float(left.min()), one, order))
     (_, nominal, of_nominal), *others = tried
-    likely = [(one, order[:_RUNS]) for _, one, order in sorted(others, key=lambda given: given[0])[:_SETS]]
+    by_chance = nominal.fit.settings.weighing.chance_stds * np.sqrt(2.0 * nominal.fit.count)
+    others.sort(key=lambda given: (max(given[0], by_chance), len(given[1].effects)))
+    likely = [(one, order[:_RUNS]) for _, one, order in others[:_SETS]]
     asked = [index for index in runs if index in of_nominal or any(index in order for _, order in likely)]
     for one, order in [(nominal, asked), *likely]:
         for index in order:
