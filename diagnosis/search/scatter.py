@@ -126,12 +126,13 @@ def differing(fitted: Fit, places: Sequence[int], kinds: Sequence[type[Effect]])
     problem, point = without_deviations(fitted)
     runs = tuple(problem.data.runs[place] for place in places)
     problem = replace(problem, data=problem.data.with_runs(runs))
-    usual_widths = tuple(usual(fitted, kind) for kind in may_scatter(kinds, problem.data))
-    if not usual_widths:
+    data = problem.data
+    able = tuple(usual(fitted, kind) for kind in data.model.may_scatter(kinds) if data.acts(kind).any())
+    if not able:
         return None
-    own, start = with_deviations(problem, Point(point.common, point.per_run[list(places)]), usual_widths)
+    own, start = with_deviations(problem, Point(point.common, point.per_run[list(places)]), able)
     most = width_prior(own).most
-    scatter = tuple(one.as_wide_as(width) for one, width in zip(usual_widths, most, strict=True))
+    scatter = tuple(one.as_wide_as(width) for one, width in zip(able, most, strict=True))
     return try_fit(replace(own, scatter=scatter), start)
 
 

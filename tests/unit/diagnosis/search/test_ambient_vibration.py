@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from diagnosis.search.process_noise import is_of_reading, random_moments
+from diagnosis.search.process_noise import is_of_reading, likeliest, random_moments
 from diagnosis.search.random_moments import RandomAnswer, obeys_a_law, weigh_random_moments
 from diagnosis.search.random_spectra import STREAM, SURROUNDINGS
+from diagnosis.search.scatter import differing
 from diagnosis.search.steady_noise import is_a_line
 from tests.marks import slow
 from tests.reference.linear_rig import response
@@ -27,6 +28,7 @@ from tests.support.gap_campaigns import (
     nominal,
     whole_runs,
 )
+from tests.support.scattered_runs import SCATTERED
 from tunnel_sim.effects import Effect, effect_class, effect_from
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Record
@@ -97,6 +99,24 @@ def test_a_moment_that_grows_with_the_pressure_is_buffeting() -> None:
     (answer,) = answers(shaken(campaign(), coefficient=0.01))
     assert answer.effects == ("buffeting",)
     assert answer.process.runs == ("r2", "r3", "r5", "r6")
+
+
+def test_a_spring_of_its_own_is_no_random_moment_and_hides_none() -> None:
+    """Still runs, of which one has a softer spring, without and with a moment of the surroundings."""
+    data = campaign()
+    still = [place for place, run in enumerate(data.runs) if run.wind_speed == 0.0]
+    for moment in (0.0, 0.02):
+        moved = shaken(data, moment=moment)
+        run = moved.runs[still[0]]
+        time = run.record.time_s
+        odd = replace(run, record=Record(time, np.interp(0.997 * time, time, run.record.yaw_rad)))
+        fitted = nominal(replace(moved, runs=(odd, *moved.runs[1:])))
+        assert still[0] == 0
+        apart = differing(fitted, still, tuple(map(effect_class, SCATTERED)))
+        assert apart is not None
+        assert likeliest(random_moments(fitted, SURROUNDINGS), fitted.settings.moment) is not None
+        shown = likeliest(random_moments(apart, SURROUNDINGS), fitted.settings.moment)
+        assert (shown is not None) == (moment > 0.0)
 
 
 @pytest.mark.slow
