@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
 from diagnosis.search.process_noise import is_of_reading, likeliest, random_moments
@@ -109,7 +110,7 @@ def test_a_spring_of_its_own_is_no_random_moment_and_hides_none() -> None:
         moved = shaken(data, moment=moment)
         run = moved.runs[still[0]]
         time = run.record.time_s
-        odd = replace(run, record=Record(time, np.interp(0.997 * time, time, run.record.yaw_rad)))
+        odd = replace(run, record=Record(time, CubicSpline(time, run.record.yaw_rad)(0.997 * time)))
         fitted = nominal(replace(moved, runs=(odd, *moved.runs[1:])))
         assert still[0] == 0
         apart = differing(fitted, still, tuple(map(effect_class, SCATTERED)))
