@@ -151,7 +151,7 @@ def possible_answers(study: Study, kinds: Sequence[type[Effect]]) -> Answers:
     even = study.settings.weighing.even_share / max(len(study.answers), 1)
     others, probability_of_answer, unknown = [], 1.0, 0.0
     for place, answer in enumerate(study.answers):
-        probability, fit = max(answer.probability - even, 0.0), answer.fit(study.nominal)
+        probability, fit = max(answer.probability - even, 0.0), answer.fit
         if place == 0:
             probability_of_answer = probability
         elif answer.effects == UNKNOWN:

@@ -36,7 +36,7 @@ from diagnosis.search.process_noise import (
 )
 from diagnosis.search.random_spectra import SOURCES, MomentSource
 from diagnosis.search.runs_in_view import RunsInView
-from diagnosis.search.scatter import differing, with_likeliest_widths
+from diagnosis.search.scatter import differing, with_likeliest_widths, without_deviations
 from diagnosis.search.steady_noise import is_a_line, is_steady_noise
 from diagnosis.search.weigh import FittedSet, log_weight
 from tunnel_sim.effects import Effect
@@ -67,6 +67,9 @@ class RandomAnswer:
     Args:
         kinds: the effects that its spectrum's parts are.
         beside: the fitted effects beside it, with residuals in the sensor's noise alone, or None.
+        fitted: the fit of these effects, or of none, in the sensor's noise and to runs that repeat. The random
+            motion is larger than what the runs differ by, and beside it narrow deviations would pull the common
+            parameters.
         left: the residual. Its share is the excess of the innovations and of the other runs over the nominal
             excess, the same in every channel.
     """
@@ -74,6 +77,7 @@ class RandomAnswer:
     kinds: tuple[type[Effect], ...]
     process: ProcessNoise
     beside: Hypothesis | None
+    fitted: Fit
     left: FittedSet
 
     @property
@@ -193,7 +197,10 @@ class _Beside:
         left = FittedSet(
             names, share, by_channel + behind, numbers, scatter_cost=cost, shown_between_runs=between
         )
-        return RandomAnswer(kinds, process, seen if seen.effects else None, left)
+        beside = seen if seen.effects else None
+        known = view.prepared.nominal if beside is None else beside.fit
+        fitted = try_fit(*without_deviations(known)) if known.problem.scatter else known
+        return RandomAnswer(kinds, process, beside, fitted or known, left)
 
 
 def _others_alike(process: ProcessNoise, shown: Sequence[ProcessNoise]) -> list[ProcessNoise]:

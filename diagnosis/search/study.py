@@ -73,14 +73,11 @@ class Answer(Weighed):
     random: RandomAnswer | None = None
     choices: tuple[Choice, ...] = ()
 
-    def fit(self, nominal: Fit) -> Fit | None:
-        """The fit of its effects; None where it has none.
-
-        Args:
-            nominal: the fit of a random moment that acts alone.
-        """
+    @property
+    def fit(self) -> Fit | None:
+        """The fit of its effects; None where it has none."""
         if self.random is not None:
-            return nominal if self.random.beside is None else self.random.beside.fit
+            return self.random.fitted
         return None if self.hypothesis is None else self.hypothesis.fit
 
     def textbook_of(self, fit: Fit) -> Fit | None:
@@ -172,7 +169,7 @@ class Study:
 
         The differences are its own. An answer that was fitted to runs that repeat has those of the first answer.
         """
-        fit = None if answer is self.answer else answer.fit(self.nominal)
+        fit = None if answer is self.answer else answer.fit
         if fit is None or not fit.problem.scatter:
             return self.beside
         return (*self.read_off, *shown_by(fit))
@@ -197,7 +194,7 @@ class Study:
     @property
     def chosen(self) -> Fit:
         """The fit of the answer; the nominal one where the answer has no fitted effect."""
-        found = None if self.answer is None else self.answer.fit(self.nominal)
+        found = None if self.answer is None else self.answer.fit
         return self.nominal if found is None else found
 
     @property

@@ -149,7 +149,7 @@ def test_a_random_moment_comes_last_and_leaves_its_innovations(data, base):
         (SpectrumPart(0.01, 5.0),), windy, np.full(4, 2.5), np.ones(4), 5.0, 0.25, [np.ones(9)] * 4, 0.012
     )
     random = RandomAnswer(
-        (kind,), process, Hypothesis((IDLE,), best), FittedSet((kind.name, IDLE), 0.01, np.zeros(6))
+        (kind,), process, Hypothesis((IDLE,), best), best, FittedSet((kind.name, IDLE), 0.01, np.zeros(6))
     )
     study = studied(data, base, (kind.name, IDLE, HUM))
     study = replace(study, answers=(Answer((kind.name, IDLE), 0.01, 0.9, random=random),))

@@ -10,6 +10,8 @@ import pytest
 from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
+from diagnosis.findings.averaged_coefficients import coefficients, possible_answers
+from diagnosis.search.investigate import investigate
 from diagnosis.search.process_noise import is_of_reading, likeliest, random_moments
 from diagnosis.search.random_moments import RandomAnswer, obeys_a_law, weigh_random_moments
 from diagnosis.search.random_spectra import STREAM, SURROUNDINGS
@@ -31,7 +33,7 @@ from tests.support.gap_campaigns import (
 )
 from tests.support.scattered_runs import SCATTERED
 from tunnel_sim.effects import Effect, effect_class, effect_from
-from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.campaign import Campaign, Repeatability
 from tunnel_sim.vocabulary.record import Record
 
 AREA, LENGTH = 0.036, 0.625
@@ -93,6 +95,19 @@ def test_a_moment_that_acts_with_the_wind_off_as_well_is_ambient_vibration() -> 
     # at the rig only the level of the spectrum around resonance is seen well
     assert part.intensity**2 / part.bandwidth == pytest.approx(0.02**2 / BANDWIDTH, rel=0.3)
     assert len(answer.process.runs) == len(CONDITIONS)
+
+
+@pytest.mark.slow
+def test_stated_differences_between_runs_do_not_pull_the_coefficients() -> None:
+    """In the sensor's noise the motion moves narrow deviations by many widths, and the coefficients with them."""
+    conditions, kinds = (*CONDITIONS, *CONDITIONS), (*ALL_RANDOM, *map(effect_class, SCATTERED))
+    data = shaken(of(conditions), conditions, moment=0.02, seed=20)
+    study = investigate(replace(data, repeatability=Repeatability(2e-4, 2e-5, 4e-4)), kinds)
+    assert study.causes == ("ambient_vibration",)
+    found = coefficients(possible_answers(study, kinds), study.campaign)["cn_beta"]
+    assert found.std is not None
+    assert found.std < 0.004
+    assert abs(found.value - CN_BETA) < 3.0 * found.std
 
 
 @pytest.mark.slow

@@ -52,7 +52,7 @@ def weighed(study: Study, moment: RandomAnswer | None = None) -> Sets:
 
 
 def shedding(share: float) -> RandomAnswer:
-    return RandomAnswer((effect_class("vortex_shedding"),), None, None, left(share))  # type: ignore[arg-type]
+    return RandomAnswer((effect_class("vortex_shedding"),), None, None, None, left(share))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("share", "is_random"), [(0.4, True), (0.6, False)])

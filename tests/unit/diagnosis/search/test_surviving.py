@@ -108,7 +108,7 @@ def test_a_set_with_a_random_moment_is_judged_as_others_are() -> None:
     base = nominal(campaign(CUBIC, duration=6.0))
     kind = effect_class("ambient_vibration")
     names = (kind.name,)
-    answer = RandomAnswer((kind,), moment(10.0 * base.total), None, FittedSet(names, 0.0, np.zeros(6)))
+    answer = RandomAnswer((kind,), moment(10.0 * base.total), None, base, FittedSet(names, 0.0, np.zeros(6)))
     found = resolved(Sets(whole_runs(base), (), random=(answer,)))
     assert found.random == ()
     assert found.refused[names].kind == "explains too much"
