@@ -37,7 +37,7 @@ from diagnosis.search.process_noise import (
 from diagnosis.search.random_spectra import SOURCES, MomentSource
 from diagnosis.search.runs_in_view import RunsInView
 from diagnosis.search.scatter import differing, with_likeliest_widths, without_deviations
-from diagnosis.search.steady_noise import is_a_line, is_steady_noise
+from diagnosis.search.steady_noise import is_a_line, is_slow, is_steady_noise
 from diagnosis.search.weigh import FittedSet, log_weight
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.capabilities import AtRandom, OwnNumbers
@@ -272,7 +272,9 @@ def _may_act(source: MomentSource, best: Hypothesis, scale: Scale, kinds: Sequen
     process = likeliest(random_moments(best.fit, source), chosen)
     if process is None or not _shown_apart(process, source, best.fit, kinds):
         return False
-    if source.in_every_run and (is_of_reading(best.fit, process) or is_a_line(best.fit, process)):
+    if source.in_every_run and (
+        is_of_reading(best.fit, process) or is_a_line(best.fit, process) or is_slow(best.fit, process, source)
+    ):
         return False
     return is_steady_noise(process, chosen) and not is_no_noise(best.fit)
 

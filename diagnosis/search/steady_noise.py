@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -9,7 +10,8 @@ from scipy.special import chdtri
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import residual_spectra
-from diagnosis.search.process_noise import ProcessNoise
+from diagnosis.search.process_noise import ProcessNoise, likeliest, random_moments
+from diagnosis.search.random_spectra import MomentSource
 from diagnosis.settings import RandomMomentSettings
 
 WHITE_INNOVATIONS: Final = 10.0
@@ -23,6 +25,10 @@ STEADY_LINE_SHARE: Final = 0.9
 """Share of the residual explained by a line with a phase per run, above which the moment is a line. Judgement
 (decision 0046). A line explains nine tenths of a random moment whose half-width is a twentieth of one over
 the duration."""
+
+SLOW_SHARE: Final = 0.5
+"""Share of the drop of −2 ln L by a random moment that slow changes of the reading bring, above which it is none.
+Convention. More than half. The rig resonates, so of nine drawn moments of the surroundings it is 0.006 at most."""
 
 _LINE_WIDTHS = 3.0  # about the centre of a spectrum in which a line is sought
 
@@ -110,3 +116,21 @@ def is_a_line(fit: Fit, process: ProcessNoise) -> bool:
         float(r @ r) - r.size for run, r in zip(runs, fit.residuals, strict=True) if run.id in process.runs
     )
     return max(drops) > STEADY_LINE_SHARE * sum(left)
+
+
+def is_slow(fit: Fit, process: ProcessNoise, source: MomentSource) -> bool:
+    """Whether slow changes of the reading explain what a random moment does: a zero of the run, or its drift.
+
+    A random moment moves the rig most near its resonance. A zero that differs from run to run has the spectrum of a
+    moment that lasts longer than the run.
+
+    Args:
+        fit: as in `is_a_line`.
+        process: the likeliest random moment of the source in its residual.
+    """
+    quick = []
+    for residual in fit.residuals:
+        slow = np.linalg.qr(np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, residual.size), 2))[0]
+        quick.append(residual - slow @ (slow.T @ residual))
+    left = likeliest(random_moments(replace(fit, residuals=quick), source), fit.settings.moment)
+    return left is None or left.drop < (1.0 - SLOW_SHARE) * process.drop

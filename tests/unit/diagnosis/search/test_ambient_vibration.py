@@ -16,7 +16,7 @@ from diagnosis.search.process_noise import is_of_reading, likeliest, random_mome
 from diagnosis.search.random_moments import RandomAnswer, obeys_a_law, weigh_random_moments
 from diagnosis.search.random_spectra import STREAM, SURROUNDINGS
 from diagnosis.search.scatter import differing
-from diagnosis.search.steady_noise import is_a_line
+from diagnosis.search.steady_noise import is_a_line, is_slow
 from tests.marks import slow
 from tests.reference.linear_rig import response
 from tests.support.gap_campaigns import (
@@ -115,6 +115,19 @@ def test_a_moment_that_grows_with_the_pressure_is_buffeting() -> None:
     (answer,) = answers(shaken(campaign(), coefficient=0.01))
     assert answer.effects == ("buffeting",)
     assert answer.process.runs == ("r2", "r3", "r5", "r6")
+
+
+@pytest.mark.parametrize(("moment", "wander"), [(0.0, 2e-3), (0.02, 0.0)])
+def test_zeros_that_differ_are_no_random_moment(moment: float, wander: float) -> None:
+    data, rng = shaken(campaign(), moment=moment), np.random.default_rng(2)
+    runs = [
+        replace(run, record=Record(run.record.time_s, run.record.yaw_rad + wander * rng.standard_normal()))
+        for run in data.runs
+    ]
+    fitted = nominal(replace(data, runs=tuple(runs)))
+    process = likeliest(random_moments(fitted, SURROUNDINGS), fitted.settings.moment)
+    assert process is not None
+    assert is_slow(fitted, process, SURROUNDINGS) == (wander > 0.0)
 
 
 def test_a_spring_of_its_own_is_no_random_moment_and_hides_none() -> None:
