@@ -326,7 +326,8 @@ class Checkpoint:
             for at, (alpha, beta, damping, iteration, finished) in enumerate(document["state"]):
                 weights = tensors[f"weights.{at}"]
                 numbers = np.array([alpha, beta, damping], dtype=np.float64)
-                if weights.size not in map(parameter_count, SIZES.values()) or weights.dtype != np.float64:
+                sizes = SIZES[NETWORKS[at // spec["starts"]]]  # network by network, start by start
+                if weights.size != parameter_count(sizes) or weights.dtype != np.float64:
                     return None
                 # Comparisons with NaN are false.
                 inside = np.abs(weights).max() <= _LARGEST and numbers.max() <= _LARGEST

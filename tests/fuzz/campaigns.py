@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from tests.fuzz.values import Draw, place_in
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.limits import LARGEST_NUMBER
 from tunnel_sim.vocabulary.record import Array, Record
 
 IDS = (
@@ -89,7 +90,9 @@ def _with_readings(draw: Draw, campaign: Campaign) -> Campaign:
     for number, run in enumerate(campaign.runs):
         record = run.record
         if chosen in (None, number):
-            record = Record(*change(draw, record.time_s.copy(), record.yaw_rad.copy()))
+            time, yaw = change(draw, record.time_s.copy(), record.yaw_rad.copy())
+            # two changes may exceed what a record takes, which is refused where it is made
+            record = Record(time, np.clip(yaw, -LARGEST_NUMBER, LARGEST_NUMBER))
         runs.append(replace(run, record=record))
     return replace(campaign, runs=tuple(runs))
 

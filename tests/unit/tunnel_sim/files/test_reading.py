@@ -239,21 +239,21 @@ def test_a_checkpoint_that_is_another_ones_is_none(tmp_path: Path) -> None:
     from safetensors.numpy import save
 
     assert read_checkpoint(tmp_path / "none", {}) is None
-    good = [[0.1, 1.0, 0.005, 3, False]]
+    good, spec = [[0.1, 1.0, 0.005, 3, False]], {"starts": 1}
     for state, ended, size in (
         (good, -1, 541), (good, 9, 541), (good, "1", 541), (good, None, 541), (good, 1, 7), ("x", 1, 541),
         ([[0.1, 1.0, "x", 3, False]], 1, 541), ([[0.1, 1.0, 0.005, -3, False]], 1, 541), ([[1.0]], 1, 541),
         ([None], 1, 541), ([[0.1, 0.0, 0.005, 3, False]], 1, 541), ([[0.0, 1.0, 0.005, 3, False]], 1, 541),
-        ([[0.1, 1e300, 0.005, 3, False]], 1, 541), ([[0.1, 1.0, -1.0, 3, False]], 1, 541),
+        ([[0.1, 1e300, 0.005, 3, False]], 1, 541), ([[0.1, 1.0, -1.0, 3, False]], 1, 541), (good, 1, 27),
     ):  # fmt: skip
-        text = json.dumps({"spec": {}, "state": state, "ended": ended})
+        text = json.dumps({"spec": spec, "state": state, "ended": ended})
         content = save({"weights.0": np.zeros(size)}, {"training": text})
-        assert Checkpoint.from_bytes(content, {}) is None, (state, ended, size)
-    text = json.dumps({"spec": {}, "state": good, "ended": 1})
+        assert Checkpoint.from_bytes(content, spec) is None, (state, ended, size)
+    text = json.dumps({"spec": spec, "state": good, "ended": 1})
     for weight in (1e300, float("nan"), float("inf")):
         content = save({"weights.0": np.full(541, weight)}, {"training": text})
-        assert Checkpoint.from_bytes(content, {}) is None, weight
-    found = Checkpoint.from_bytes(save({"weights.0": np.zeros(541)}, {"training": text}), {})
+        assert Checkpoint.from_bytes(content, spec) is None, weight
+    found = Checkpoint.from_bytes(save({"weights.0": np.zeros(541)}, {"training": text}), spec)
     assert found is not None
     assert len(found.ended) == 1
 
