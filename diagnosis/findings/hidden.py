@@ -140,7 +140,7 @@ def _confirmed(fit: Fit, start: StartingPoint, found: _Size, reach: float) -> _S
         rise = (again.unlikelihood - limit) / reach
         # refits beside chance differences may end in several minima, so the rise may have a step
         within = max((abs(one) for one, root in known if root < 1.0), default=0.0)
-        if abs(rise - 1.0) <= _CONFIRMED or (rise > 1.0 and abs(size) < _CLOSE * within):
+        if abs(rise - 1.0) <= _CONFIRMED or (rise > 1.0 and within < abs(size) < _CLOSE * within):
             return replace(
                 found,
                 size=size,

@@ -28,14 +28,8 @@ _FEWEST = 6.0  # cycles of a run in which jumps are sought
 _SMOOTH, _SLOW = 4, 2  # orders of the slow change of amplitude and phase, the first time and then
 _ROUNDS = 3  # of finding that change, each from the previous one
 _COLUMNS = 23  # of `_Oscillation.around`
-_OF_JUMPS = [
-    5,
-    6,
-    10,
-    11,
-    20,
-    21,
-]  # of these, what is not continued to a start: fast changes, kinks and the jump
+#: Of these columns, those that are not continued to a start: fast changes and kinks of both waves, and the jump.
+_OF_JUMPS = (5, 6, 10, 11, 20, 21)
 _AT_ONCE = 200  # instants, which bounds the memory
 _FREE = 0.015  # departure of the start over the swing, root mean square, that every run may have
 _HELD = 3  # cycles in which a start that is not free is sought

@@ -241,7 +241,7 @@ class WholeRuns(View):
                 found[one.names] = of_more_weight(found.get(one.names), one, self._scattering_gap)
         return Sets(view, tuple(found.values()))
 
-    @property
+    @cached_property
     def _none(self) -> Hypothesis:
         """Chance differences between the runs alone."""
         assert self.scattering is not None

@@ -13,9 +13,11 @@ import pytest
 from scipy.signal import butter, lfilter, lfilter_zi
 
 from diagnosis import diagnose
+from diagnosis.findings.disturbed_runs import disturbed_words
 from diagnosis.findings.next_steps import next_steps
 from diagnosis.findings.verdict import headline
 from diagnosis.result import Diagnosis
+from diagnosis.search.disturbance import Disturbance
 from diagnosis.search.disturbed import disturbances, undisturbed
 from diagnosis.search.investigate import investigate, nominal_study
 from diagnosis.search.odd_run import replaceable
@@ -95,6 +97,12 @@ def test_a_hold_of_more_than_a_cycle_is_left_out_whole(plain: Campaign) -> None:
         assert one.run == "r2"
         assert one.kept_from_s is None or one.kept_from_s >= 0.8
     assert disturbances(friction, nominal(friction)) == ()
+
+
+def test_a_start_that_is_used_nevertheless_is_not_said_to_be_left_out() -> None:
+    words = disturbed_words(Disturbance("r2", None, None, 1e-5, used=True, kept_from_s=0.8), no_gap=False)
+    assert words.startswith("Run r2 does not move as the others do at its start. It is used nevertheless")
+    assert "not used" not in words
 
 
 def test_a_run_alone_at_its_spring_or_without_wind_is_not_odd(plain: Campaign) -> None:

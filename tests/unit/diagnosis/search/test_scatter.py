@@ -21,6 +21,8 @@ from diagnosis.search.views.whole_runs import WholeRuns
 from tests.marks import slow
 from tests.reference.free_decays import damped_cosine
 from tests.support.scattered_runs import SCATTERED
+from tunnel_reference.draw import Mixture
+from tunnel_reference.make import as_campaign, draw_set, simulate_set
 from tunnel_sim.effects import ALL_EFFECTS, Effect, effect_class
 from tunnel_sim.vocabulary.campaign import (
     Campaign,
@@ -105,6 +107,15 @@ def test_scatter_hides_no_cause() -> None:
     assert {*found.causes} <= {"cubic_stiffness", STIFFNESS, DAMPED}
     name = "cubic_stiffness.coefficient"
     assert abs(found.chosen.value(name) - 0.1) < 4.0 * found.chosen.std(name)
+
+
+@pytest.mark.slow
+def test_wide_differences_do_not_hide_a_lag_beside_a_form_that_is_not_exact() -> None:
+    """A quintic spring and a lead, of the reference simulator: runs that repeat fit worse than wide differences."""
+    shares = {"single": 0.3, "pair": 0.17, "three": 0.14, "four": 0.11, "none": 0.14, "outside": 0.14}
+    (made,) = simulate_set([draw_set(40, 71, shares, Mixture(edition=3))[3]])
+    kinds = vocabulary(["cubic_stiffness", "unsteady_aero_lag", *SCATTERED])
+    assert diagnose(as_campaign(made, "lead"), kinds=kinds).causes == ("cubic_stiffness", "unsteady_aero_lag")
 
 
 def test_an_effect_that_does_what_the_scatter_does_is_left_out() -> None:
