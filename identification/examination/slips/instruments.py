@@ -162,6 +162,7 @@ _REFINED = 1.3  # factor on τ about the best of these
 _SWEEPS = 2  # of the poles' linear corrections
 _SHARE_LEFT = 0.05  # of the centre's decay that may remain as a zero
 _LEAD = 0.2  # relative tolerance of the lead about arctan(1/ωτ)
+_LASTING = 0.5  # cycles; least τ in a single run, since the hold of a hand is over within the first cycle
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,6 +171,7 @@ class _Decaying:
 
     Args:
         constant: τ, s.
+        period: of the oscillation, s.
         centre: at the start, rad.
         zero, zero_std: at the end, rad.
         lead: phase lead of the oscillation beyond a release from rest, rad.
@@ -178,6 +180,7 @@ class _Decaying:
 
     run: str
     constant: float
+    period: float
     centre: float
     zero: float
     zero_std: float
@@ -207,6 +210,8 @@ class CoupledSensor(StatementSlip):
         decaying = [one for swing in seen.swings if (one := _decaying(swing)) is not None]
         found = [one for one in decaying if one.coupled]
         if 2 * len(found) <= len(decaying):  # one sensor reads all runs; beside a drift some lead by chance
+            return ()
+        if len(found) == 1 < len(seen.swings) and found[0].constant < _LASTING * found[0].period:
             return ()
         constant = float(np.median([one.constant for one in found]))
         what = (
@@ -247,7 +252,7 @@ def _decaying(swing: Swing) -> _Decaying | None:
         return None  # a filter keeps an oscillation pure; another motion leads and creeps by chance
     std = np.sqrt(squares / freedom * inverse[-1, -1])
     expected = np.arctan(1.0 / (decay.omega_d * tau))
-    return _Decaying(swing.run.id, tau, centre, zero, float(std), float(lead), float(expected))
+    return _Decaying(swing.run.id, tau, period, centre, zero, float(std), float(lead), float(expected))
 
 
 def _fit_with_centre(time: Array, yaw: Array, decay: Decay, tau: float) -> tuple[float, Decay, Array, Array]:

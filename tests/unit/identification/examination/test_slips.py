@@ -17,7 +17,7 @@ from identification.examination.slips.spoilt_records import ClockJumps
 from identification.status import Outcome, Status
 from tests.marks import slow
 from tests.support.slip_cases import FURTHER, PLAIN, SIX, TABLE, Case
-from tests.support.slip_rig import SPEEDS, SPRINGS, Condition, high_passed, honest, repeated
+from tests.support.slip_rig import INERTIA, SPEEDS, SPRINGS, Condition, high_passed, honest, reading, repeated
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
@@ -158,6 +158,18 @@ def test_a_drift_that_settles_is_no_coupled_sensor_where_a_few_runs_lead_by_chan
 
     assert not said(led)
     assert said({run.id for run in free})
+
+
+def test_a_centre_that_one_run_has_within_its_first_cycle_is_no_sensor():
+    """A hand that still holds at the start gives such a reading, and one run alone cannot tell the two apart."""
+    period = 2.0 * np.pi * np.sqrt(INERTIA / honest().runs[0].spring_stiffness)
+    brief, lasting = (reading(high_passed(share * period, held=False), "r3") for share in (0.19, 0.9))
+
+    def said(data):
+        return [one for one in examine(data).remarks if "AC-coupled" in one.what]
+
+    assert said(lasting(honest()))
+    assert not said(brief(honest()))
 
 
 def test_what_looks_like_a_wrong_unit_is_kept_where_the_campaign_vouches_for_it():
