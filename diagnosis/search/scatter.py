@@ -126,14 +126,42 @@ def differing(fitted: Fit, places: Sequence[int], kinds: Sequence[type[Effect]])
     problem, point = without_deviations(fitted)
     runs = tuple(problem.data.runs[place] for place in places)
     problem = replace(problem, data=problem.data.with_runs(runs))
+    widest = _with_widest(problem, Point(point.common, point.per_run[list(places)]), fitted, kinds)
+    return None if widest is None else try_fit(*widest)
+
+
+def with_own_linear_terms(fitted: Fit, kinds: Sequence[type[Effect]]) -> tuple[Problem, Point] | None:
+    """The problem of a fit with deviations of every run as wide as they may be, at the fit's point.
+
+    A run then says of an effect only what its spring and damping do not; None where the runs may not differ.
+
+    Args:
+        kinds: the effects that may be named.
+    """
+    widest = _with_widest(*without_deviations(fitted), fitted, kinds)
+    return None if widest is None else (widest[0], _same_deviations(*widest, fitted))
+
+
+def _with_widest(
+    problem: Problem, point: Point, fitted: Fit, kinds: Sequence[type[Effect]]
+) -> tuple[Problem, Point] | None:
+    """A problem without deviations, with the widest ones that its runs may have; None where they have none."""
     data = problem.data
     able = tuple(usual(fitted, kind) for kind in data.model.may_scatter(kinds) if data.acts(kind).any())
     if not able:
         return None
-    own, start = with_deviations(problem, Point(point.common, point.per_run[list(places)]), able)
+    own, start = with_deviations(problem, point, able)
     most = width_prior(own).most
-    scatter = tuple(one.as_wide_as(width) for one, width in zip(able, most, strict=True))
-    return try_fit(replace(own, scatter=scatter), start)
+    return replace(own, scatter=tuple(one.as_wide_as(w) for one, w in zip(able, most, strict=True))), start
+
+
+def _same_deviations(problem: Problem, point: Point, fitted: Fit) -> Point:
+    """A point with the deviations of a fit, of the numbers that it has."""
+    names, release = fitted.problem.parameters.own_names, point.per_run.copy()
+    for place, name in enumerate(problem.parameters.own_names):
+        if name in names:
+            release[:, place] = fitted.point.per_run[:, names.index(name)]
+    return Point(point.common, release)
 
 
 def evident(fitted: Fit) -> Fit:
@@ -213,12 +241,8 @@ def with_scatter(fitted: Fit, scatter: Scatter) -> Fit:
     """A fit with other chance differences between its runs; unchanged where that fails."""
     if scatter == fitted.problem.scatter:
         return fitted
-    names = fitted.problem.parameters.own_names
     problem, point = with_deviations(*without_deviations(fitted), scatter)
-    for place, name in enumerate(problem.parameters.own_names):
-        if name in names:
-            point.per_run[:, place] = fitted.point.per_run[:, names.index(name)]
-    return try_fit(problem, point, tolerance=_TOLERANCE) or fitted
+    return try_fit(problem, _same_deviations(problem, point, fitted), tolerance=_TOLERANCE) or fitted
 
 
 def named(fitted: Fit) -> tuple[str, ...]:
