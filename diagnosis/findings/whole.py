@@ -11,6 +11,7 @@ from typing import Annotated, Any, Self, cast, get_args, get_type_hints
 from pydantic import TypeAdapter
 
 from diagnosis.answer.held_out import Waterfall
+from diagnosis.findings.by_run import CausesByRun
 from diagnosis.findings.candidates import Candidate, candidates_pictures
 from diagnosis.findings.cause_sizes import CauseSize
 from diagnosis.findings.causes import NamedCauses
@@ -164,6 +165,7 @@ class Findings:
     found: Found = field(default_factory=Found)
     friction: FrictionCurve | None = None
     costs: WhatItCosts | None = None
+    by_run: CausesByRun | None = None
     further_runs: FurtherRuns | None = None
     data: Annotated[Campaign | None, UNWRITTEN] = field(default=None, compare=False)
 
