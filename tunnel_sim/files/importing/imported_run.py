@@ -135,7 +135,7 @@ def _on_the_cut(
         at = "at the largest rate after the release" if rate else "where the body is released"
         remarks.append(ImportRemark(f"begins at {first} s, {at}", f"begins {at}"))
     if piece.last < raw.cleaned.time_s.size and piece.stopped:
-        fact = f"ends at {last} s, where something stops the body"
+        fact = f"ends at {last} s, where something stops or pushes the body"
         remarks.append(doubt_of_motion(fact, f"--end {name}=SECONDS changes it"))
     elif piece.last < raw.cleaned.time_s.size:
         why = "with the motion or before the next run"

@@ -57,7 +57,7 @@ class RecordPiece:
     Args:
         doubt: why it is left out, although the motion decays; empty: it is a run.
         held: by which a hand held the body after the largest reading, s; these samples are left out.
-        stopped: whether something ends the motion before the record ends.
+        stopped: whether something ends the free motion before the record ends.
         again: index of a second release within the run, where the file names it as one; 0: there is none.
     """
 
@@ -103,6 +103,7 @@ class _Decay:
         count: number of swings that exceed the noise and a share of the largest one.
         until: the extreme at which something else begins, or the last one.
         doubt: why it is not a run; empty: it is one.
+        pushed: whether a push ends it, after which the body swings on.
     """
 
     hand: int
@@ -110,6 +111,7 @@ class _Decay:
     count: int
     until: int
     doubt: str = ""
+    pushed: bool = False
 
     @property
     def whole(self) -> bool:
@@ -172,11 +174,26 @@ def _decays(swings: Swings) -> list[_Decay]:
             continue
         still = np.flatnonzero(sizes <= max(_BAND * float(sizes.max()), swings.least))
         moving = int(still[0]) if still.size else sizes.size
-        if moving >= _LEAST_HALVES and _is_decay(
-            sizes[:moving], sizes, swings, start, followed=until < count
-        ):
-            found.append(_Decay(hand, start, moving, until))
+        followed = until < count
+        push = _pushed(sizes[:moving], swings) if hand >= 0 else 0
+        if push:
+            sizes, moving, until, followed = sizes[:push], push, start + push, True
+        if moving >= _LEAST_HALVES and _is_decay(sizes[:moving], sizes, swings, start, followed=followed):
+            found.append(_Decay(hand, start, moving, until, pushed=push > 0))
     return found
+
+
+def _pushed(sizes: PerSample, swings: Swings) -> int:
+    """The first swing that a push enlarges within an even decay; 0 if there is none.
+
+    Swings that grow slowly are those of a second mode, and swings that vary at random are those of the wind.
+    """
+    smallest = np.minimum.accumulate(sizes)
+    grown = sizes > np.maximum(_GROWN * swings.sampled * smallest, smallest + swings.least)
+    for k in np.flatnonzero(grown & (sizes > _LITTLE * sizes[0])):
+        before = int(np.argmin(sizes[:k]))
+        return before + 1 if k - before <= _GROWS_FOR and _is_even(sizes[:before]) else 0
+    return 0
 
 
 def _settled(swings: Swings, start: int, until: int) -> int:
@@ -279,6 +296,9 @@ def _piece(
         free = free_from(time_s, reading, first, turns[1:], noise)
         first, held = free, float(time_s[free] - time_s[first])
     moved = int(turns[-1])
+    if decay.pushed:
+        last = free_until(time_s, reading, moved + 1, turns[1:-1], noise)
+        return RecordPiece(first, last, decay.doubt, held, stopped=True)
     if (stop := decay.stopped(swings)) is not None:
         last = int(swings.reached[min(stop + 1, swings.at.size - 1)]) + 1
         before = swings.at[decay.start + 1 : stop + 1]

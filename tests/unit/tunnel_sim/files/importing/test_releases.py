@@ -156,7 +156,25 @@ def test_a_stopped_run_and_a_late_start_are_said(tmp_path: Path) -> None:
     log = Log(frequency=2.0).rest(1.0).pull(0.35, 1.0).hold(0.6).swing(0.35, 10.0).rest(4.0)
     rows = "".join(f"{t:.3f},{y:.8f}\n" for t, y in zip(*log.reading(), strict=True))
     imported = read_records([written(tmp_path, "day.csv", "time_s,yaw_rad\n" + rows)])
-    assert any("ends at 12.595 s, where something stops the body" in line for line in imported.remarks())
+    said = "ends at 12.595 s, where something stops or pushes the body"
+    assert any(said in line for line in imported.remarks())
+
+
+@pytest.mark.parametrize("zeta", [0.003, 0.006, 0.012])
+def test_a_run_ends_at_a_push_that_enlarges_its_swings(zeta: float) -> None:
+    """Twelve cycles, a push, and the rest of the motion, between two whole runs."""
+    for push in (1.75, 1.9):
+        log = Log(frequency=2.0, zeta=zeta)
+        log.pull(0.35, 1.0).hold(1.0).swing(0.35, 15.0)
+        log.pull(0.35, 1.0).hold(1.0).swing(0.35, 6.0)
+        left = 0.35 * np.exp(-zeta * 4.0 * np.pi * 6.0)
+        log.swing(push * left, 9.0)
+        log.free.pop()
+        log.pull(0.2, 1.0).hold(1.0).swing(0.2, 15.0)
+        time, reading = log.reading(2e-4)
+        pieces = find_runs(time, reading)
+        assert wrong(log, pieces) == "", push
+        assert [piece.stopped for piece in pieces] == [False, True, False]
 
 
 def random_motion(rng: np.random.Generator, zeta: float, size: int) -> Array:
