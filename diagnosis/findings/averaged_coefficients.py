@@ -18,6 +18,7 @@ from diagnosis.answer.linear_theory import (
     coefficient_gradients,
     coefficient_move,
     coefficients_of,
+    influences,
     starts_beside,
     wind_on_runs,
 )
@@ -427,11 +428,28 @@ def _of_answer(
     }
     noise, forms = small.noise[:, place], small.forms[:, place]
     found = NormalMixture(small.weights, value + small.moves[:, place], noise + forms + sum(common.values()))
+    formal = float(small.weights @ noise)
+    by_scatter = _by_scatter(fit, place) * formal
     within = {
-        "noise": float(small.weights @ noise),
+        "noise": formal - by_scatter,
+        "scatter": by_scatter,
         "small causes": float(small.weights @ forms) + found.between,
     }
     return answer.probability, found, within | common
+
+
+def _by_scatter(fit: Fit, place: int) -> float:
+    """The share of a coefficient's formal variance that is due to chance differences between the runs.
+
+    The rest follows from the noise, by the coefficient's derivatives with respect to the readings.
+    """
+    if not fit.problem.scatter:
+        return 0.0
+    gradient = coefficient_gradients(fit)[place]
+    whole = float(gradient @ fit.stated_covariance @ gradient)
+    both = float(gradient @ fit.covariance @ gradient)
+    noise = sum(float(part[:, place] @ part[:, place]) for part in influences(fit))
+    return max(both - noise, 0.0) / whole if whole > 0.0 else 0.0
 
 
 def _estimate(fit: Fit, name: str, value: float, std: float, parts: Mapping[str, float]) -> Quantity:

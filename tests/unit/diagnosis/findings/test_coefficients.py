@@ -3,6 +3,7 @@
 Truth: the values that the campaigns were made with; mixtures of normal distributions in closed form.
 """
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -25,12 +26,14 @@ from diagnosis.findings.units import own_estimate
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.similarity import Similarity
+from diagnosis.search.scatter import as_stated
 from diagnosis.settings import AnswerSettings, Settings
 from identification.show.numbers import estimated
 from identification.show.quantity import Quantity
 from tests.marks import slow
 from tests.support.gap_campaigns import CN_BETA, CN_R, answer, campaign, nominal, precise, studied
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
+from tunnel_sim.vocabulary.campaign import Repeatability
 
 CAUSE = "quadratic_damping"
 TRUE = {"cn_beta": CN_BETA, "cn_r": CN_R}
@@ -75,6 +78,18 @@ def test_one_answer_with_white_residuals_has_the_interval_of_its_fit(data, best)
         assert found[name].std == pytest.approx(best.std(name), rel=1e-6)
         assert found[name].interval is None
         assert abs(found[name].value - TRUE[name]) < 3.0 * found[name].std
+
+
+@pytest.mark.parametrize(("width", "low", "high"), [(1e-6, 0.0, 0.01), (3e-3, 0.99, 1.0)])
+def test_the_scatter_of_the_wind_speed_is_told_from_the_noise(data, width, low, high):
+    """Truth: no unbiased estimator has less noise than that of runs which repeat exactly."""
+    given = replace(precise(data), repeatability=Repeatability(wind_speed=width))
+    repeating, kinds = nominal(precise(data)), [effect_class("wind_speed_scatter")]
+    found = only(as_stated(nominal(given), kinds), given)["cn_beta"]
+    assert low < found.shares["scatter"] < high
+    assert sum(found.shares.values()) == pytest.approx(1.0)
+    noise = math.sqrt(found.shares["noise"]) * found.std
+    assert 0.999 * repeating.std("cn_beta") < noise < 3.0 * repeating.std("cn_beta")
 
 
 def test_the_digits_of_the_density_count(data, best):
