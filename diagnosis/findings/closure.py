@@ -14,7 +14,7 @@ import numpy as np
 from diagnosis.answer.held_out import Waterfall
 from diagnosis.findings.finding import Judged, Picture
 from diagnosis.findings.misfit import Misfit
-from diagnosis.findings.terms import answer_name
+from diagnosis.findings.terms import answer_name, without_scatter
 from diagnosis.where.maps import Maps
 from identification.show.blocks import TextTable
 from identification.show.drawing import ACCENT, AFTER, BEFORE, INK, LINE, NARROW, NOISE, PAPER, QUIET, SIGMAS
@@ -207,11 +207,24 @@ def waterfall_table(waterfall: Waterfall, misfit: Misfit) -> TextTable:
 
 
 def shares_of_gap(waterfall: Waterfall) -> dict[str, tuple[float, str]]:
-    """By cause, its share of the gap as the causes are added, and those with which it was added."""
+    """By cause, its share of the gap as the causes are added, and those with which it was added.
+
+    Chance differences between the runs come last: they remain where a cause is removed from the rig. The fit of the
+    waterfall adds them first, where they absorb a part of the causes.
+    """
     found: dict[str, tuple[float, str]] = {}
-    taken = waterfall.steps
+    taken = list(waterfall.steps)
     if not taken or taken[0].excess <= 0.0:
         return found
+    by_chance = next(
+        (step for step in taken if step.effect and not without_scatter(step.effect.split(" + "))), None
+    )
+    least = 0.0 if by_chance is None else waterfall.without.get(str(by_chance.effect), 0.0)
+    if by_chance is not None and least > 0.0:
+        last = taken[-1].excess
+        taken.remove(by_chance)
+        taken = [replace(step, excess=max(step.excess, least)) for step in taken]
+        taken.append(replace(by_chance, excess=last))
     for before, step in pairwise(taken):
         names = str(step.effect).split(" + ")
         part = max(before.excess, 0.0) - max(step.excess, 0.0)

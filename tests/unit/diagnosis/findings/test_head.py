@@ -15,12 +15,13 @@ from diagnosis.findings.closure import shares_of_gap
 from diagnosis.findings.decision import decision
 from diagnosis.findings.head import Head
 from diagnosis.findings.next_steps import next_steps
+from diagnosis.findings.terms import SCATTERS
 from diagnosis.findings.verdict import verdict
 from diagnosis.settings import Settings
 from identification.show.blocks import as_text
 from identification.show.numbers import changed_by, to_interval
 from identification.show.quantity import Quantity
-from tests.support.diagnosis_document import document, findings_of
+from tests.support.diagnosis_document import CAUSE, document, findings_of, scattering_document
 from tests.support.rendered import consequence
 from tests.support.shown_numbers import assert_shows
 
@@ -124,6 +125,21 @@ def test_steps_are_ordered_by_the_share_of_the_gap_and_scatter_comes_after_the_c
     given["waterfall"][1:] = [{"effect": DRY, "excess": 3.0}, {"effect": SPRING, "excess": 0.0}]
     assert next_steps(findings_of(given))[0].endswith("removes 70.0 % of the gap.")
     assert not any("tunnel" in step for step in next_steps(answer))
+
+
+def test_the_removal_of_a_cause_leaves_the_scatter_and_no_more() -> None:
+    """The runs' scatter, fitted first, absorbs a part of the cause; it is what remains without the cause."""
+    given = scattering_document()
+    names = [name for name in given["causes"] if name in SCATTERS]
+    given["waterfall"] = [
+        {"effect": None, "excess": 500.0},
+        {"effect": " + ".join(names), "excess": 300.0},
+        {"effect": CAUSE, "excess": 0.0},
+    ]
+    given["without"] = {" + ".join(names): 5.0, CAUSE: 300.0}
+    parts = shares_of_gap(findings_of(given).waterfall)
+    assert parts[CAUSE][0] == pytest.approx(0.99)
+    assert parts[names[0]][0] == pytest.approx(0.01)
 
 
 @pytest.mark.parametrize(("source", "step", "left"), [
