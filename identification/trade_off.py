@@ -187,6 +187,8 @@ _RUNS: Sequence[tuple[Callable[[Role], object], Callable[[Setting], str]]] = (
 
 def separating(first: Role, second: Role, rig: Setting) -> str:
     """The run that separates two parameters, as a clause in the imperative."""
+    if first.wind and second.wind and first.wind != second.wind:  # neither acts with the wind off
+        return "add runs at another wind speed"
     for follows, run in _RUNS:
         if follows(first) != follows(second):
             return run(rig)

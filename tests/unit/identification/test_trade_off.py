@@ -55,6 +55,7 @@ FRICTION, SHAPE = Role(amplitude=0.0), Role(amplitude=None)
         (ROLES["yaw_inertia"], ROLES["added_stiffness"], JOINT, "known inertia"),
         (ROLES["yaw_inertia"], ROLES["added_stiffness"], DRIVEN, "lower and higher frequencies"),
         (ROLES["mechanical_damping"], ROLES["cn_r"], RIG, "wind off or at another wind speed"),
+        (ROLES["cn_beta"], ROLES["cn_r"], RIG, "add runs at another wind speed"),
         (ROLES["mechanical_damping"], FRICTION, RIG, "releases from larger and smaller angles"),
         (ROLES["added_stiffness"], FRICTION, DRIVEN, "drive it to larger and smaller angles"),
         (ROLES["yaw_inertia"], ROLES["drive_gain"], RIG, "free decays"),
