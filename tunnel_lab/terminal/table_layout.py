@@ -156,8 +156,25 @@ def folded(table: TextTable, width: int) -> TextTable | None:
     room = least + _spare(table, width)
     if room < _FOLDED or table.columns[0] in table.names:
         return None
-    rows = tuple(("\n".join(wrap(row[0], room) or [""]), *row[1:]) for row in table.rows)
+    rows = tuple(("\n".join(_broken(row[0], room)), *row[1:]) for row in table.rows)
     return replace(table, rows=rows)
+
+
+def _broken(cell: str, room: int) -> list[str]:
+    """A cell in lines of some width, broken at blanks; a longer word at the last mark in it that fits."""
+    lines = []
+    for line in wrap(cell, room, break_long_words=False, break_on_hyphens=False) or [""]:
+        left = line
+        while cell_len(left) > room:
+            marks = [mark.end() for mark in _MARK.finditer(left[:room])]
+            at = marks[-1] if marks else room
+            lines.append(left[:at])
+            left = left[at:]
+        lines.append(left)
+    return lines
+
+
+_MARK = re.compile(r"[-_./]")
 
 
 def _least_widths(table: TextTable) -> list[int]:

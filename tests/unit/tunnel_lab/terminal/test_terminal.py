@@ -6,6 +6,7 @@ import io
 import json
 import shutil
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,7 +15,7 @@ from rich.console import Console
 from identification.show.blocks import TextTable
 from tests.support.command import Tunnel
 from tunnel_lab.terminal import progress
-from tunnel_lab.terminal.table_layout import is_too_wide, stacked
+from tunnel_lab.terminal.table_layout import folded, is_too_wide, stacked
 from tunnel_sim.files.reading import inside, nearest
 
 
@@ -148,3 +149,14 @@ def test_a_path_that_is_wrong_gets_the_one_beside_it(
 
 def test_where_nothing_is_similar_nothing_is_suggested(tmp_path: Path) -> None:
     assert nearest(tmp_path / "anything") == nearest(tmp_path / "no" / "such") == inside(tmp_path) == ""
+
+
+def test_a_long_name_is_broken_at_its_marks() -> None:
+    table = TextTable("Runs", ("run", "wind"), (("test003_K16.12_V10", "a" * 20), ("r", "off")))
+    narrow = folded(table, 42)
+    assert narrow is not None
+    assert narrow.rows[0][0].splitlines() == ["test003_K16.12_", "V10"]
+    assert narrow.rows[1][0] == "r"
+    unmarked = folded(replace(table, rows=(("x" * 20, "a" * 20),)), 42)
+    assert unmarked is not None
+    assert "".join(unmarked.rows[0][0].splitlines()) == "x" * 20
