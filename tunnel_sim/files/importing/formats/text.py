@@ -30,9 +30,9 @@ _NUMBER = {
 _FACT = re.compile(
     r"(?:^|[,;|\t])\W*([^\W\d_](?:[^\d:=,;\t]|(?<=[^\W_])\d|(?<=\^)-?\d)*?)\s*[:=,;\t]\s*"
     r"(?:([^\s\d:=,;\t|][^:=,;\t|]{0,14}?)\s*[;,\t]\s*)?([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)"
-    r" *([;,\t]? *[^\s\d;,\t|=:][^;,\t|=:]*(?![^;,\t|]))?"
+    r"(?!\d|[.:/-]\d) *([;,\t]? *[^\s\d;,\t|=:][^;,\t|=:]*(?![^;,\t|]))?"
 )
-"""A name, perhaps a cell with its unit, a number, and its unit, perhaps in the next cell."""
+"""A name, perhaps a cell with its unit, a number, and its unit, perhaps in the next cell; no date or time."""
 _HERTZ = {"hz": 1.0, "khz": 1e3, "mhz": 1e6}
 _SI = {kind: next(unit for unit, factor in units.items() if factor == 1.0) for kind, units in UNITS.items()}
 _AXIS = re.compile(r"(?i)\W*(horizontal|vertical) units?\s*[,:;=\t]\s*(.+)$")

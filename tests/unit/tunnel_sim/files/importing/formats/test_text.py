@@ -14,7 +14,7 @@ from tests.support.import_files import Text, any_dialect, csv, decay, written
 from tunnel_sim import TunnelError
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.columns import find_pairs
-from tunnel_sim.files.importing.formats.text import find_dialect
+from tunnel_sim.files.importing.formats.text import facts_in, find_dialect
 from tunnel_sim.files.importing.records import read_records
 from tunnel_sim.files.importing.tables import Channel, Table
 from tunnel_sim.files.importing.units import known_unit, split_unit
@@ -280,3 +280,8 @@ def test_a_rate_that_is_not_one_is_not_believed(stated: str, tmp_path: Path) -> 
     rows = "".join(f"{a}\n" for a in decay()[1].tolist())
     with pytest.raises(TunnelError, match="no column of times"):
         read_records([written(tmp_path, "log.csv", f"{stated}\nyaw (rad)\n{rows}")])
+
+
+@pytest.mark.parametrize("stamp", ["14.03.2026", "2026-03-14", "03/14/2026", "14:03:07", "14.03.26 15:10"])
+def test_a_date_or_a_time_of_day_states_no_number(stamp: str) -> None:
+    assert facts_in([f"Datum;{stamp}", f"Date: {stamp}", "Luftdichte;1,190"]) == {"Luftdichte": 1.19}
