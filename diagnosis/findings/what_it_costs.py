@@ -75,7 +75,7 @@ class WhatItCosts(Finding):
         words = f"At {self.wind_speed:g} m/s the moment of the air is {said}. Here ± spans the 95 % interval."
         table = TextTable(title, heads, rows, right=heads[1:])
         drawn = (one.block for one in self.pictures(judged))
-        return Section("costs", "What the gap costs", (Paragraph(words, "What it costs"), table, *drawn))
+        return Section("costs", "What the gap costs", (Paragraph(words, "Moments of the air"), table, *drawn))
 
     def pictures(self, judged: Judged) -> tuple[Picture, ...]:
         """The moments before and after, a panel each."""

@@ -174,6 +174,7 @@ def test_a_diagnosis_prints_verdict_tables_and_caveats(diagnosis: Diagnosis) -> 
         "What it costs",
         "Do this first",
     ]
+    assert sum(line.startswith("What it costs:") for line in lines) == 1
     assert "The gap is explained by coulomb friction." in lines
     assert "coulomb_friction         97 %                99.0 %" in lines
     assert "coulomb_friction  friction_moment  0.003990 ± 0.000060 N m" in lines
