@@ -224,6 +224,8 @@ def in_radians(
                 raise asking('--calibration "a + b*V"', what, where, ", or --unit if it is an angle")
         unit, swing = guessed_angle_unit(values)
         no_unit, change = f"the file states no unit of '{reading.name}'", "--unit changes this"
+        if calibration is not None:
+            no_unit = f"the calibration of '{reading.name}' states no unit of the angle"
         remarks.append(
             doubt(
                 f"{no_unit}: a swing of ±{swing:.4g} is taken as {unit}; {change}",

@@ -202,8 +202,12 @@ def test_a_voltage_is_converted_by_formula_or_table(tmp_path: Path) -> None:
         "V,angle (deg)\n" + "".join(f"{v},{np.rad2deg(0.5 * (v - 2.5))}\n" for v in range(5)),
     )
     for calibration in ("-1.25 + 0.5*V", str(table)):
-        (run,) = read_records([path], ImportChoices(calibration=calibration)).campaign.runs
+        imported = read_records([path], ImportChoices(calibration=calibration))
+        (run,) = imported.campaign.runs
         np.testing.assert_allclose(run.record.yaw_rad, angle, atol=1e-9)
+        assert any(
+            "the calibration of 'pot' states no unit of the angle" in line for line in imported.remarks()
+        )
     for text in ("2*V**2", "12*(V-2.5", "1 + V + 2", "V/0", "12*(V*V)", "a + b*V", "1.5"):
         with pytest.raises(TunnelError, match="is not a formula"):
             read_records([path], ImportChoices(calibration=text))
