@@ -129,7 +129,10 @@ def _on_the_cut(
         free = (
             f"from where on the motion is free: the {piece.held:.3g} s before it are not part of a free decay"
         )
-        remarks.append(doubt_of_motion(f"begins at {first} s, {free}", f"--start {name}=SECONDS changes it"))
+        short = "begins after its release, from where on the motion is free; --start RUN=SECONDS changes it"
+        remarks.append(
+            doubt_of_motion(f"begins at {first} s, {free}", f"--start {name}=SECONDS changes it", short)
+        )
     elif piece.first:
         rate = raw.quantity == "rate"
         at = "at the largest rate after the release" if rate else "where the body is released"

@@ -35,6 +35,6 @@ def doubt(text: str, short: str | None = None) -> ImportRemark:
     return ImportRemark(text, short, doubt=True)
 
 
-def doubt_of_motion(fact: str, settled: str = "") -> ImportRemark:
+def doubt_of_motion(fact: str, settled: str = "", short: str | None = None) -> ImportRemark:
     """A doubt about the motion of one run: the fact, and the option that settles it, empty where none does."""
-    return ImportRemark(f"{fact}; {settled}" if settled else fact, doubt=True, motion=fact)
+    return ImportRemark(f"{fact}; {settled}" if settled else fact, short, doubt=True, motion=fact)

@@ -212,3 +212,16 @@ def test_a_pull_to_the_next_hold_between_two_samples_loses_no_release(seed: int)
     yaw = np.concatenate(parts) + 0.007
     yaw = np.round((yaw + 3.5e-4 * rng.standard_normal(yaw.size)) / step) * step
     assert len(find_runs(np.arange(yaw.size) / rate, yaw)) == 2
+
+
+def test_late_starts_of_several_runs_are_one_line_beside_the_table(tmp_path: Path) -> None:
+    for name in ("a", "b", "c"):
+        log = Log(frequency=2.0).rest(1.0).pull(0.35, 1.0).hold(0.63, 0.004).swing(0.35, 10.0)
+        rows = "".join(f"{t:.3f},{y:.8f}\n" for t, y in zip(*log.reading(), strict=True))
+        written(tmp_path, f"{name}.csv", "time_s,yaw_rad\n" + rows)
+    imported = read_records(sorted(tmp_path.glob("*.csv")))
+    _, judged = imported.summary()
+    late = [line for line in judged if "from where on the motion is free" in line]
+    assert len(late) == 1
+    assert "--start RUN=SECONDS" in late[0]
+    assert any("--start b=SECONDS" in line for line in imported.remarks())
