@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -25,9 +24,9 @@ from diagnosis.search.weigh import UNKNOWN
 from identification.printing import COEFFICIENTS
 from identification.show.blocks import Pairs, Paragraph, Section
 from identification.show.numbers import (
+    change_up_to,
     explained_in,
     listed,
-    p_text,
     percent_of,
     plain,
     probability,
@@ -35,7 +34,7 @@ from identification.show.numbers import (
     to_interval,
     unit_mark,
 )
-from identification.show.quantity import INTERVAL, Quantity
+from identification.show.quantity import Quantity
 from tunnel_sim.vocabulary.dimensions import beside
 
 
@@ -172,10 +171,8 @@ def _sure(answer: Findings) -> str:
     if answer.cycling:
         return "Every run is in a limit cycle"
     if not answer.causes:
-        alarms = percent_of(answer.gap.false_alarm_rate)
-        return (
-            f"Nothing beyond chance (p {p_text(answer.gap.p_value)}; false alarms in {alarms} of campaigns)"
-        )
+        chance = percent_of(answer.gap.p_value)
+        return f"Nothing beyond chance: noise alone departs as much in {chance} of campaigns"
     if not answer.decided:
         return f"Not yet: {'; '.join(_likeliest(answer))}"
     rest = ""
@@ -247,8 +244,7 @@ def _coefficient(one: Quantity, before: Quantity | None) -> str:
     unit = "" if one.unit in ("1", "1/rad") else unit_mark(beside(one.unit))
     if before is None or not before.determined:
         return f"{text}{unit}"
-    change, reach = abs(before.value - one.value), INTERVAL * (one.std or 0.0)
-    if change <= max(reach, _UNCHANGED * abs(one.value)):
+    if one.agrees(before.value) or abs(before.value - one.value) <= _UNCHANGED * abs(one.value):
         return f"{text}{unit}, unchanged"
     return f"{text}{unit} instead of {before.value:.{places}f}"
 
@@ -260,13 +256,11 @@ def _further(answer: Findings) -> str:
     """The change that the residual gap may add; empty where it is not material."""
     if answer.rest is None or not answer.rest_is_material:
         return ""
+    after = answer.coefficients.after
     moves = [
-        f"{COEFFICIENTS.get(name, name)} by {percent_of(one.relative)}"
+        f"{COEFFICIENTS.get(name, name)} by {change_up_to(one.value, after[name])}"
         for name, one in answer.rest.moves.items()
-        if name != "moment_offset"
-        and one.material
-        and one.relative is not None
-        and math.isfinite(one.relative)
+        if name != "moment_offset" and one.material
     ]
     return f"; the gap that remains could change {listed(moves)}" if moves else ""
 

@@ -125,7 +125,7 @@ def _corrects(answer: Findings) -> str:
         if two is None or not (one.determined and two.determined) or one.value * two.value <= 0.0:
             continue
         change = abs(relative_change(one.value, two.value))
-        if _VISIBLE <= change < 1.0 and abs(one.value - two.value) > two.reach:
+        if _VISIBLE <= change < 1.0 and not two.agrees(one.value):
             found.append(f"{COEFFICIENTS.get(name, name)} by {100.0 * change:.0f} %")
     return f" and corrects {listed(found)}" if found else ""
 

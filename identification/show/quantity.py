@@ -68,6 +68,11 @@ class Quantity(AsNumber):
         low, high = self.ends
         return 0.5 * (high - low)
 
+    def agrees(self, value: float) -> bool:
+        """Whether the 95 % interval contains a value, in ``unit``."""
+        low, high = self.ends
+        return low <= value <= high
+
     @property
     def known_std(self) -> float:
         """The standard deviation that every quantity of an `Estimate` has, in ``unit``.

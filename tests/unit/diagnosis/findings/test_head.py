@@ -22,7 +22,7 @@ from identification.show.blocks import as_text
 from identification.show.numbers import changed_by, to_interval
 from identification.show.quantity import Quantity
 from tests.support.diagnosis_document import CAUSE, document, findings_of, scattering_document
-from tests.support.rendered import consequence
+from tests.support.rendered import consequence, rest_words
 from tests.support.shown_numbers import assert_shows
 
 DRY, SPRING = "coulomb_friction", "spring_miscalibration"
@@ -79,7 +79,7 @@ def test_the_head_is_the_same_in_every_face() -> None:
 @pytest.mark.parametrize(
     ("changes", "what", "sure", "costs", "first"),
     [
-        ({"causes": []}, "No gap: the model agrees", "Nothing beyond chance (p ", "Nothing: Cn", "Use"),
+        ({"causes": []}, "No gap: the model agrees", "Nothing beyond chance: noise", "Nothing: Cn", "Use"),
         ({"causes": ["unknown"]}, "A gap that no known effect explains; it acts on the damping", "97 %", "Not corr",
          "Examine what acts on the damping"),
         ({"causes": ["damping_scatter"]}, "The runs differ from each other by chance", "97 %", "Cnβ 0.4", "Run"),
@@ -193,6 +193,30 @@ def test_no_number_of_the_head_contradicts_the_verdict() -> None:
     assert "Cnβ falls by 10 % (0.478 → 0.432)" in said
     assert "0.432" in head.costs
     assert "0.478" in head.costs
+
+
+def test_the_head_calls_no_coefficient_unchanged_that_the_first_step_corrects() -> None:
+    given = two_causes(causes=[DRY])
+    given["candidates"][0] |= {"effect": DRY}
+    given["waterfall"] = [{"effect": None, "excess": 10.0}, {"effect": DRY, "excess": 0.0}]
+    # A wide deviation and an interval to one side, beyond which the value without the cause lies.
+    given["coefficients"]["after"]["cn_beta"] |= {"std": 0.03, "interval": [0.36, 0.45]}
+    head = Head.of(findings_of(given))
+    assert "Cnβ by 10 %" in head.first
+    assert "Cnβ 0.432 (0.360 to 0.450) instead of 0.478" in head.costs
+    given["coefficients"]["after"]["cn_beta"]["interval"] = [0.36, 0.49]
+    head = Head.of(findings_of(given))
+    assert "Cnβ" not in head.first
+    assert "Cnβ 0.432 (0.360 to 0.490), unchanged" in head.costs
+
+
+def test_the_head_and_the_verdict_state_one_change_by_the_gap_that_remains() -> None:
+    given = two_causes(causes=["unknown"])
+    moves = {"cn_beta": {"value": 0.13262, "relative": 0.304, "std": 0.01, "unit": "1/rad", "material": True}}
+    given["rest"] |= {"significant": True, "material": True, "moves": moves, "words": ""}
+    answer = findings_of(given)
+    assert "could change Cnβ by 31 %" in rest_words(answer)
+    assert "could change Cnβ by 31 %" in Head.of(answer).costs
 
 
 @pytest.mark.parametrize(("value", "std", "interval", "shown"), [
