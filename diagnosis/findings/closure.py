@@ -291,9 +291,10 @@ WITHIN_THE_NOISE = "within the noise"
 
 def waterfall_pictures(waterfall: Waterfall, maps: Maps | None, judged: Judged) -> tuple[Picture, ...]:
     """The residual gap as the causes are added; none without causes."""
+    circles = " Open circles: all causes but this one." if len(waterfall.without) > 1 else ""
     drawn = Picture(
         "waterfall",
-        "What the model misses, as the causes are added one after another. Open circles: without this cause alone.",
+        f"What the model misses, as the causes are added one after another.{circles}",
         "The residual gap as the causes are added one after another.",
         partial(waterfall_figure, waterfall, maps, judged),
     )

@@ -79,6 +79,13 @@ def test_the_key_names_only_what_is_seen(given: Document) -> None:
     assert key(axes_of(given)) == set()
 
 
+def test_the_caption_explains_the_circles_where_there_are_any(given: Document) -> None:
+    circles = "Open circles: all causes but this one."
+    assert circles in findings_of(given).pictures["waterfall"].caption
+    given["without"] = dict(list(given["without"].items())[:1])
+    assert circles not in findings_of(given).pictures["waterfall"].caption
+
+
 def boxes(axes: Any) -> tuple[list[Bbox], list[Bbox]]:
     """What is drawn of the texts and of the dots, in pixels."""
     axes.figure.draw_without_rendering()
