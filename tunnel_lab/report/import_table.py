@@ -22,13 +22,14 @@ def parts_table(imported: Imported) -> TextTable:
         time, run = part.raw.cleaned.file_time_s[part.piece.first : part.piece.last], part.run
         cells = [f"{time.size}", "left out", *[""] * (len(headings) - 2)]
         if run is not None:
+            spring = part.held.get("spring_stiffness", run.spring_stiffness)
             cells[1:] = [
                 f"{run.record.sample_rate:.4g}",
                 f"{time[0]:.3f}",
                 f"{time[-1]:.3f}",
                 f"±{0.5 * (part.reading.max() - part.reading.min()):.3g}",
                 *([f"{run.wind_speed:g}"] if wind else []),
-                "not stated" if run.spring_stiffness is None else f"{run.spring_stiffness:g}",
+                "not stated" if spring is None else f"{spring:g}",
             ]
         rows.append((part.id, *cells))
     return TextTable("Read", ("run", *headings), tuple(rows), right=headings)

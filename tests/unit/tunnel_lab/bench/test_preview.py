@@ -13,6 +13,7 @@ from tunnel_lab.bench import column_units, conditions, preview
 from tunnel_lab.bench.parts import page_words
 from tunnel_lab.bench.records import write
 from tunnel_lab.bench.workspace import Session
+from tunnel_lab.report.import_table import parts_table
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.files.importing.choices import ImportChoices, read_recipe
 from tunnel_sim.files.importing.import_statements import ImportStatements
@@ -215,3 +216,10 @@ def test_a_second_release_in_a_run_that_a_file_names_is_to_be_judged(session: Se
     (said,) = preview.doubts_of(named)
     assert said == "a second release at 5 s, though the file names one run"
     assert f"{said}; --end log=5 ends it there" in named.said  # the import's sentence, with its option
+
+
+def test_the_table_has_the_spring_of_a_run_that_still_needs_an_air_density(session: Session) -> None:
+    log = session.uploads / "log.csv"
+    log.write_text("wind speed [m/s],10\nspring stiffness [N m/rad],16.25\n\n" + log.read_text())
+    (row,) = parts_table(preview.read(session)[0]).rows
+    assert row[-2:] == ("10", "16.25")
