@@ -65,7 +65,7 @@ def write_report(answer: Findings, campaign: Campaign, path: Path, byline: Bylin
 def render_report(answer: Findings, campaign: Campaign, byline: Byline | None = None) -> str:
     """The page as HTML that needs no other file and no network; the same for the same document and byline.
 
-    It begins with the answer in short. Printed, it is two pages, the first complete in itself.
+    It begins with the answer in short. Printed, it is two pages, the first complete in itself; one without a gap.
     """
     from markupsafe import Markup
 
@@ -78,7 +78,7 @@ def render_report(answer: Findings, campaign: Campaign, byline: Byline | None = 
             blocks = (*blocks, Paragraph(f"The model is written to {byline.patch}."))
         html = as_html(blocks, drawn, titled=section.key != "head")
         if section.key in ("head", "coefficients-section"):  # narrow lines: none ends within a value
-            html = re.sub(r"(?<=\d) (?=%|to )|(?<=\bN) (?=m\b)", "\u00a0", html)
+            html = re.sub(r"(?<=\d) (?=%|to |N\b|rad\b)|(?<=\bN) (?=m\b)", "\u00a0", html)
         if html:
             parts[section.key] = {"title": section.title, "html": Markup(html)}
     folded = [key for key in parts if key not in (*_OPEN, *_PRINTED)]

@@ -384,6 +384,14 @@ def without_causes(given: Any) -> None:
     given["candidates"][0]["effect"] = "none"
 
 
+def exact(given: Any) -> None:
+    """No gap, and coefficients of many digits."""
+    without_causes(given)
+    for name in ("cn_beta", "cn_r"):
+        for part in ("before", "after"):
+            given["coefficients"][part][name] |= {"std": 1.2e-5}
+
+
 def unknown(given: Any) -> None:
     given["causes"], given["waterfall"], given["without"] = ["unknown"], given["waterfall"][:1], {}
 
@@ -399,11 +407,20 @@ def changed(change: Callable[[Any], None]) -> str:
     return render_report(findings_of(given), campaign())
 
 
-KINDS = [lambda _: None, crowded, slow(without_causes), slow(unknown), slow(undecided)]
+KINDS = [lambda _: None, crowded, slow(unknown), slow(undecided)]
 FIRST_PAGE = """() => {
   const [first, second] = document.querySelectorAll(".sheet");
   return [first.innerText, second.innerText, getComputedStyle(second).breakBefore];
 }"""
+
+
+def test_a_report_without_a_gap_is_printed_on_one_page(browser: Any, tmp_path: Path) -> None:
+    (tmp_path / "report.html").write_text(changed(without_causes), encoding="utf-8")
+    page = browser.new_page()
+    page.goto((tmp_path / "report.html").as_uri())
+    for paper in ("Letter", "A4"):
+        assert pages(page.pdf(format=paper, margin=MARGINS)) == 1
+    page.close()
 
 
 @pytest.mark.parametrize("change", KINDS)
@@ -460,6 +477,34 @@ def test_on_a_phone_the_answer_fills_the_first_screen_in_large_letters_and_the_s
     assert fit < 844.0  # px: the height of a common phone
     assert fit < coefficients < steps < min(closes, 2.0 * 844.0)
     assert least >= 19.0
+
+
+BROKEN = """() => {
+  const found = [];
+  for (const cell of document.querySelectorAll("#coefficients-section td.n, #head dd")) {
+    const walker = document.createTreeWalker(cell, NodeFilter.SHOW_TEXT), range = document.createRange();
+    for (let node = walker.nextNode(); node; node = walker.nextNode()) {
+      for (const word of node.textContent.matchAll(/[\\d.]+( N m| %)?/g)) {
+        range.setStart(node, word.index);
+        range.setEnd(node, word.index + word[0].length);
+        if (new Set([...range.getClientRects()].map((one) => Math.round(one.top))).size > 1) found.push(word[0]);
+      }
+    }
+  }
+  return found;
+}"""
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.3])
+def test_no_number_of_the_head_and_the_coefficients_is_broken_on_a_phone(
+    browser: Any, tmp_path: Path, scale: float
+) -> None:
+    (tmp_path / "report.html").write_text(changed(exact), encoding="utf-8")
+    page = browser.new_page(viewport={"width": 390, "height": 844})
+    page.goto((tmp_path / "report.html").as_uri())
+    page.evaluate(f"document.documentElement.style.fontSize = '{16.0 * scale}px'")
+    assert page.evaluate(BROKEN) == []
+    page.close()
 
 
 BREAKS = """(what) => {
