@@ -100,9 +100,9 @@ class NamedCauses:
         if not said:
             return f"Repair or model the cause of {plain(name)}"
         values = _parameters(self.candidates[0], name)
-        shown = {full: f"{one.value:.4g} {unit_mark(one.unit)}" for full, one in values.items()}
-        for full, text in shown.items():
-            said = said.replace(f"{{{full}}}", text)
+        for full, one in values.items():
+            value = f"{one.value:g}" if one.std == 0.0 else f"{one.value:.4g}"  # stated, or estimated
+            said = said.replace(f"{{{full}}}", f"{value} {unit_mark(one.unit)}")
         return said
 
     def certain_and_open(self, *, sized: bool = True) -> tuple[list[str], list[tuple[str, float]]]:

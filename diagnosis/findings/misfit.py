@@ -71,7 +71,7 @@ def run_labels(runs: Sequence[RunMap]) -> list[str]:
     for run in runs:
         parts = [run.id]
         if run.spring_stiffness:
-            parts.append(f"{run.spring_stiffness:.4g} N m/rad")
+            parts.append(f"{run.spring_stiffness:g} N m/rad")
         if windy:
             parts.append(f"{run.wind_speed:g} m/s" if run.wind_speed > 0.0 else "wind off")
         labels.append(" · ".join(parts))

@@ -36,8 +36,7 @@ def count_of_springs(found: Sequence[SpringError]) -> str:
 def choices_of_spring(found: Sequence[SpringError]) -> str:
     """The alternative errors of springs: ``16.12 N m/rad by −1.96 % or 44.84 N m/rad by 2.00 %``."""
     each = (
-        f"{one.stiffness:.4g} N m/rad by {for_people(100.0 * one.error, 100.0 * one.std, '%')}"
-        for one in found
+        f"{one.stiffness:g} N m/rad by {for_people(100.0 * one.error, 100.0 * one.std, '%')}" for one in found
     )
     return " or ".join(each)
 
@@ -59,7 +58,7 @@ def choice_steps(found: Sequence[SpringError]) -> list[NextStep]:
     if not stiffness:
         return []
     further, which = ("third", "both springs") if len(stiffness) == 2 else ("further", "these springs")
-    springs = listed([f"{one:.4g}" for one in stiffness])
+    springs = listed([f"{one:g}" for one in stiffness])
     return [
         NextStep(
             f"Measure the stiffness of {which} again ({springs} N m/rad), or add runs with a {further} spring",
@@ -72,7 +71,7 @@ def _spring_off(found: SpringError) -> str:
     """A spring that may be off, such as ``16.12 N m/rad is 1.96 % softer than stated``."""
     size = for_people(100.0 * abs(found.error), 100.0 * found.std, "%")
     side = "stiffer" if found.error > 0.0 else "softer"
-    return f"{found.stiffness:.4g} N m/rad is {size} {side} than stated"
+    return f"{found.stiffness:g} N m/rad is {size} {side} than stated"
 
 
 def two_springs_words(found: Mapping[str, Any]) -> str:

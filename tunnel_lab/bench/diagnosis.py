@@ -412,7 +412,7 @@ def show_run(run: NextRun) -> None:
     wind = "off" if run.wind_speed == 0.0 else f"{run.wind_speed:g} m/s"
     show_facts(
         [
-            (f"{run.spring_stiffness:.4g} N m/rad", "spring"),
+            (f"{run.spring_stiffness:g} N m/rad", "spring"),
             (wind, "wind"),
             (f"{run.release_angle:.2g} rad ({degrees(run.release_angle):.0f}°)", "release"),
             (f"{run.duration:.3g} s", "length of the record"),

@@ -272,7 +272,7 @@ class SpringMiscalibration(Effect):
         size = text(100.0 * abs(error), None if std is None else 100.0 * std, "%")
         side = "stiffer" if error > 0.0 else "softer"
         true = f"({stated * (1.0 + error):#.4g} N m/rad)"
-        return f"a spring of {stated:.4g} N m/rad that is {size} {side} than stated {true}"
+        return f"a spring of {stated:g} N m/rad that is {size} {side} than stated {true}"
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:

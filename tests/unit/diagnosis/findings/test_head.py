@@ -69,6 +69,14 @@ def test_two_causes_with_their_sizes_the_probability_the_cost_and_the_first_step
     assert not head.warnings
 
 
+def test_a_spring_is_named_as_it_was_stated() -> None:
+    given = two_causes()
+    given["candidates"][0]["parameters"][f"{SPRING}.spring_stiffness"]["value"] = 21.0234
+    head = Head.of(findings_of(given))
+    assert head.what.startswith("A spring of 21.0234 N m/rad that is 1.91 % softer than stated")
+    assert head.first.startswith("Measure the stiffness of the spring of 21.0234 N m/rad again")
+
+
 def test_the_head_is_the_same_in_every_face() -> None:
     answer = findings_of(two_causes())
     head = Head.of(answer)

@@ -317,6 +317,9 @@ def test_springs_that_may_be_off_are_said_with_what_would_tell():
         "16.12 N m/rad is 1.961 ± 0.010 % softer than stated (50 %), or 44.84 N m/rad is 2.000 ± 0.010 % stiffer "
         "than stated (50 %)"
     ) in text
+    alike = said("spring_miscalibration", choices=[OFF | {"stiffness": 16.121}, OFF | {"stiffness": 16.124}])
+    assert "16.121 N m/rad is" in alike
+    assert "16.124 N m/rad is" in alike
     both = {
         "kind": "two springs off",
         "springs": [OFF, OFF | {"stiffness": 21.0}],
