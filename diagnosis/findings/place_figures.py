@@ -89,7 +89,7 @@ def runs_figure(maps: Maps) -> Figure:
     if not np.isfinite(cells).any():
         axes.text(0.5, 0.5, "every cell within the noise", transform=axes.transAxes, ha="center")
     axes.set_yticks(range(len(runs)), [*map(figure_text, run_labels(runs))])
-    axes.set_xlabel(TIME)
+    axes.set_xlabel(TIME, loc="right")  # below long names of runs too, as the axis may be shorter
     colour_bar(fig, image, axes, location="top", label="excess (noise variances)", aspect=50)
     return fig
 

@@ -158,6 +158,16 @@ def test_the_map_of_runs(given: Document) -> None:
     ]  # fmt: skip
 
 
+def test_the_time_axis_of_runs_with_long_names_is_labelled_within_the_figure() -> None:
+    given = document()
+    for number, run in enumerate(given["maps"]["runs"]):
+        run["id"] = f"Messung_{number}_lang"
+    fig = rendered.runs_figure(findings_of(given))
+    fig.draw_without_rendering()
+    label = fig.axes[0].xaxis.label.get_window_extent()
+    assert 0.0 <= label.x0 < label.x1 <= fig.bbox.width
+
+
 def test_a_map_within_the_noise_says_so(given: Document) -> None:
     given["maps"]["time"]["by_run"] = [[0.01, -0.02, None]] * 3
     texts = rendered.runs_figure(findings_of(given)).axes[0].texts
