@@ -77,7 +77,7 @@ def render_report(answer: Findings, campaign: Campaign, byline: Byline | None = 
         if section.key == "patch" and byline.patch and section.blocks:
             blocks = (*blocks, Paragraph(f"The model is written to {byline.patch}."))
         html = as_html(blocks, drawn, titled=section.key != "head")
-        if section.key in ("head", "coefficients-section"):  # narrow lines: none ends within a value
+        if section.key in ("head", "coefficients-section", "next"):  # narrow lines: none ends within a value
             html = re.sub(r"(?<=\d) (?=%|to |N\b|rad\b)|(?<=\bN) (?=m\b)", "\u00a0", html)
         if html:
             parts[section.key] = {"title": section.title, "html": Markup(html)}
