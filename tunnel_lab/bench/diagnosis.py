@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from functools import partial
+from html import escape
 from math import degrees
 from typing import TYPE_CHECKING
 
@@ -206,10 +207,8 @@ class ShownAnswer:
         from diagnosis.findings.sections import sections
         from diagnosis.findings.verdict import headline
 
-        words, kind = headline(answer)
         parts = {section.key: section.blocks for section in sections(answer)}
-        with ui.element("section").classes(f"verdict {kind}").props("aria-label=Verdict"):
-            ui.label(words).classes("answer")
+        with ui.element("section").classes(f"verdict {headline(answer)[1]}").props("aria-label=Verdict"):
             show_blocks(parts.pop("head"))
             ui.label(answer.verdict)
         if answer.maps:
@@ -240,7 +239,11 @@ class ShownAnswer:
             chosen += [one.name for finding in answer.findings.values() for one in finding.pictures(answer)]
             pictures = [answer.pictures[name] for name in chosen if name in answer.pictures]
             drawn = [(one, one.draw()) for one in pictures]
-            return [inline_svg(fig, one.name, one.description) for one, fig in drawn if fig is not None]
+            return [
+                f"{inline_svg(fig, one.name, one.description)}<figcaption>{escape(one.caption)}</figcaption>"
+                for one, fig in drawn
+                if fig is not None
+            ]
 
         figures = await asyncio.to_thread(drawings)
         if self._figures.is_deleted:

@@ -353,6 +353,11 @@ def test_the_fit_over_the_data_is_beside_the_answer(browser: Any, served: Bench)
         assert reading.evaluate(seen) == "visible"
         frame = one.page.locator('iframe[title="The fit over the data"]').bounding_box()
         assert frame["height"] > 600
+        one.page.wait_for_selector(".figures svg")
+        for figure in one.page.locator(".figures figure").all():
+            assert figure.locator("svg ~ figcaption").inner_text()
+        assert one.page.locator(".verdict dd").count() == 4
+        assert one.page.locator(".verdict > :first-child dt").first.inner_text() == "What"
     assert [text.partition(" ")[0] for text in shown] == ["alpha", "gamma"]
 
 
