@@ -109,6 +109,11 @@ class RunsInView:
         del answer, settled
         return True
 
+    def of_differing_runs(self, likely: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
+        """Likely sets fitted to whole runs, where the runs differ beside one of them and the view cannot say so."""
+        del likely
+        return ()
+
     # ---- how they are fitted to whole runs ----
 
     def whole(self, hypothesis: Hypothesis) -> Hypothesis | None:

@@ -27,6 +27,8 @@ RIVAL_FORMS: Final = 0.05
 """Minimum probability of a rival set for its forms to be freed. Judgement."""
 OUTSIDE_FROM: Final = 0.05
 """Minimum probability of a set for comparison with explanations outside the vocabulary. Judgement."""
+LIKELY_FROM: Final = 0.05
+"""Minimum probability of a set for the runs to be compared beside it. Judgement. Time against coverage."""
 
 Names = tuple[str, ...]
 
@@ -107,6 +109,13 @@ class Sets:
         """The most probable answer that is a fitted set."""
         named = (self.fitted(w.effects) for w in self.weighed)
         return next((hypothesis for hypothesis in named if hypothesis is not None), None)
+
+    @property
+    def likely(self) -> list[Hypothesis]:
+        """The fitted sets that are not improbable, the most probable first; none beside a random moment."""
+        named = (w.effects for w in self.weighed if w.probability > LIKELY_FROM)
+        found = [*filter(None, (self.best, *map(self.fitted, named)))]
+        return [] if self.random else list(dict.fromkeys(found))
 
     @property
     def answer(self) -> Hypothesis | None:

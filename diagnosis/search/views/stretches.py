@@ -26,6 +26,7 @@ from diagnosis.search.hypothesis import Hypothesis, with_forms
 from diagnosis.search.one_more import sets_with_one_more
 from diagnosis.search.prepared import Prepared, fit_nominal
 from diagnosis.search.runs_in_view import FORM_OPEN
+from diagnosis.search.scatter import scattered
 from diagnosis.search.sets import Sets
 from diagnosis.search.views.view import View
 from tunnel_sim.effects import Effect
@@ -226,3 +227,13 @@ class InStretches(View):
             whole, _ = fit_longer(hypothesis.fit, self.long, self.prepared.nominal.problem.data)
             return replace(hypothesis, fit=whole)
         return None
+
+    def of_differing_runs(self, likely: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
+        """The likely sets fitted to whole runs, where the runs differ beside one of them; else none.
+
+        Chance differences between runs are compared in whole runs alone. In stretches they would be taken for
+        effects, and the coefficients for uncertain.
+        """
+        found = sorted(filter(None, map(self.whole, likely)), key=lambda one: one.fit.total)
+        differ = any(scattered(one.fit, self.prepared.kinds) is not None for one in found)
+        return tuple(found) if differ else ()

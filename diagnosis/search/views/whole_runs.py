@@ -60,19 +60,33 @@ class WholeRuns(View):
     Args:
         first: the set that all others contain; None: the empty set.
         unscattered: the nominal fit with runs that repeat exactly, where those of the base do not.
+        known: the likely sets of another view, beside which the runs differ.
     """
 
     first: Hypothesis | None = None
     unscattered: Fit | None = None
+    known: tuple[Hypothesis, ...] = ()
 
     may_be_noise: ClassVar[bool] = True
 
     @classmethod
     def after(cls, prepared: Prepared, known: Sets | None, clock: StepClock) -> Self | None:
-        """The first view, or one after a view whose answer does not hold in whole runs."""
-        del clock
-        if known is not None and known.view.holds(known.answer, known.settled):
-            return None
+        """The first view, or one after a view whose answer does not hold in whole runs, or whose runs differ."""
+        holds = known is not None and known.view.holds(known.answer, known.settled)
+        with clock.step("effects"):
+            others = () if known is None else known.view.of_differing_runs(known.likely)
+            if holds and not others:
+                return None
+            view = cls.of(prepared, others)
+            return None if holds and not view.explained else view
+
+    @classmethod
+    def of(cls, prepared: Prepared, known: tuple[Hypothesis, ...] = ()) -> Self:
+        """Whole runs, with the nominal model fitted to them.
+
+        Args:
+            known: the likely sets of another view, beside which the runs differ.
+        """
         first = prepared.ringing
         moving, rested = without_long_rest(prepared.nominal.problem.data)
         if rested:  # where dry friction stops a body, χ² has many minima
@@ -80,11 +94,17 @@ class WholeRuns(View):
             if nominal is not None:  # the rest may be too short: then whole runs
                 prepared = replace(prepared, nominal=nominal, rested=rested)
         if not prepared.nominal.problem.scatter:
-            return cls(prepared, prepared.nominal, first)
+            return cls(prepared, prepared.nominal, first, known=known)
         # the runs differ as much as stated, or more
         base = scattered(prepared.nominal, prepared.kinds) or prepared.nominal
         repeating = try_fit(*without_deviations(prepared.nominal)) or prepared.nominal
-        return cls(prepared, base, first, unscattered=repeating)
+        return cls(prepared, base, first, unscattered=repeating, known=known)
+
+    @cached_property
+    def explained(self) -> tuple[Hypothesis, ...]:
+        """The known sets that explain every run by itself, beside chance differences between the runs."""
+        tried = (self.beside(one) for one in self.known)
+        return tuple(one for one in tried if one is not None and self._explains(one))
 
     @property
     def repeating(self) -> Fit:
@@ -120,7 +140,7 @@ class WholeRuns(View):
         """
         if self.unscattered is not None or self.first is not None:
             return _with_moments(super().sets(clock), clock)
-        explained: list[Hypothesis] = []
+        explained = list(self.explained)
         beyond: list[float] = []
 
         def enough(level: Sequence[Hypothesis]) -> bool:
@@ -131,7 +151,7 @@ class WholeRuns(View):
             return bool(explained or beyond)
 
         with clock.step("effects"):
-            grown = grow(self, clock.progress, enough)
+            grown = list(self.known) if explained else grow(self, clock.progress, enough)
             scale = Scale.of((*grown, self.smallest), self.gap, self.base.settings.weighing)
             likely = sorted(grown, key=lambda one: -scale.weight(one))[:BESIDE_SCATTER]
         if explained:
