@@ -68,7 +68,7 @@ from identification import identify
 from identification.estimate import Estimate
 from identification.show.quantity import Quantity
 from identification.status import Remark, left_out_as_asked
-from tunnel_sim.effects import BetweenRuns, effect_class, the_effect
+from tunnel_sim.effects import BetweenRuns, effect_class
 from tunnel_sim.effects.capabilities import SecondOscillation
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -471,9 +471,9 @@ def _closable(study: Study, named: _Named, say: Progress) -> tuple[Closable | No
 
 
 def _second_modes(study: Study, chosen: Chosen) -> tuple[TwoModes, ...]:
-    """Second modes of single runs, where a set with one was weighed: only then its share of the gap is known."""
-    tried = any(the_effect(SecondOscillation).name in answer.effects for answer in study.answers)
-    return second_modes(chosen.campaign) if tried else ()
+    """Second modes of single runs, where one may be named: sets of stretches have none."""
+    able = any(issubclass(kind, SecondOscillation) for kind in study.prepared.kinds)
+    return second_modes(chosen.campaign) if able else ()
 
 
 def _from_outside(study: Study) -> tuple[Fact, ...]:

@@ -127,16 +127,16 @@ def _said(one: AirMoment) -> str:
 def _change(one: AirMoment) -> str:
     """The change of a moment's size by the causes, in per cent of the nominal one; empty where one is at a bound.
 
-    ± spans the 95 % interval, as if the two estimates were independent.
+    ± spans the 95 % interval of the moment with the causes. The nominal moment is the number that the causes
+    change: its own deviation contains their error.
     """
     before, after = one.before, one.after
     if before.bound or after.bound or not before.value:
         return ""
-    if before.value * after.value < 0.0 or before.std is None or after.std is None:
+    if before.value * after.value < 0.0 or after.std is None:
         return size_change(before.value, after.value)
     change = 100.0 * relative_change(before.value, after.value)
-    ratio = after.value / before.value
-    std = 100.0 * INTERVAL * math.hypot(after.std / before.value, ratio * before.std / before.value)
+    std = 100.0 * INTERVAL * abs(after.std / before.value)
     if max(abs(change), std) < _NO_CHANGE:
         return f"less than {_NO_CHANGE:g} %"
     return f"{'+' if change > 0.0 else ''}{with_std(change, std)} %"

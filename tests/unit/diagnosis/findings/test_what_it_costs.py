@@ -73,8 +73,7 @@ def test_a_coefficient_at_a_bound_is_said_to_be_and_has_no_change() -> None:
     assert isinstance(words, Paragraph)
     assert isinstance(table, TextTable)
     assert "yaw rate. Here ± spans the 95 % interval." in words.text
-    reach = 196.0 * math.hypot(0.002 / 0.5, 0.4 * 0.01 / 0.5**2)  # of a ratio, by its two parts
-    assert table.rows[0][-1] == f"-20.0 ± {reach:.1f} %"
+    assert table.rows[0][-1] == "-20.00 ± 0.78 %"  # 1.96 · 0.002 / 0.5: the nominal number is exact
     assert table.rows[1][-1] == "–"
     assert "(at its lower bound)" in table.rows[1][1]
 
