@@ -99,7 +99,8 @@ class Diagnosis(Findings):
         from tunnel_lab.report import Byline, write_report  # as in `plot`
 
         if self.data is None:
-            raise TunnelError("the answer does not hold its runs", remedy="diagnose the campaign again")
+            remedy = "give them: tunnel_lab.report.write_report(answer, read_campaign(folder), path)"
+            raise TunnelError("an answer read from a file does not hold its runs", remedy=remedy)
         today = datetime.now().astimezone().date().isoformat()
         return write_report(self, self.data, Path(path), Byline(today, author, notes))
 

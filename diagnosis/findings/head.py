@@ -175,9 +175,13 @@ def _sure(answer: Findings) -> str:
         return f"Nothing beyond chance: noise alone departs as much in {chance} of campaigns"
     if not answer.decided:
         return f"Not yet: {'; '.join(_likeliest(answer))}"
-    rest = ""
+    rest = (
+        "; of one run, a fault of which may be the cause"
+        if answer.names_effects and len(answer.gap.runs) == 1
+        else ""
+    )
     if answer.rest_is_material and answer.names_effects:
-        rest = f"; {answer.misfit.words(answer.gap.excess_after)} of misfit remains"
+        rest += f"; {answer.misfit.words(answer.gap.excess_after)} of misfit remains"
     if answer.ambiguous_with:
         certain, alternatives = answer.named_causes.certain_and_open(sized=False)
         known = [f"{answer.named_causes.included(name)} for {_called(answer, name)}" for name in certain]

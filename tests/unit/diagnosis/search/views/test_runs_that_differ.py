@@ -26,10 +26,11 @@ WIND, SPRING = 0.003, 0.0005
 def differing(seed: int, *, stated: bool = False) -> Campaign:
     """Nine runs, their differences stated or not."""
     rng = np.random.default_rng(seed)
-    actual = [
-        (k * (1.0 - BY * (k == SOFT)) * (1.0 + SPRING * rng.standard_normal()), v * (1.0 + WIND * rng.standard_normal()))
-        for k, v in STATED
-    ]  # fmt: skip
+    actual = []
+    for stiffness, speed in STATED:
+        spring, wind = rng.standard_normal(2)
+        soft = 1.0 - BY * (stiffness == SOFT)
+        actual.append((stiffness * soft * (1.0 + SPRING * spring), speed * (1.0 + WIND * wind)))
     data = campaign(conditions=actual, seed=seed)
     runs = tuple(
         replace(run, spring_stiffness=k, wind_speed=v) for run, (k, v) in zip(data.runs, STATED, strict=True)
