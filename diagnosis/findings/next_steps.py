@@ -84,7 +84,8 @@ def _mending(answer: Findings) -> Iterator[NextStep]:
         step = NextStep(answer.named_causes.advice(name), _gain(answer, name, parts))
         found.append((name in SCATTERS, _part(parts, [name]), step))
     open_ones = [name for name in answer.causes if name not in certain and name not in SCATTERS]
-    found += [(False, _part(parts, open_ones or names), step) for step in _telling_apart(answer)]
+    told_apart = open_ones or [name for name in answer.causes if name not in names] or names
+    found += [(False, _part(parts, told_apart), step) for step in _telling_apart(answer)]
     later = [name for name in names if name in open_ones]
     found += [
         (False, -1.0, NextStep(answer.named_causes.advice(name), "if it is this one")) for name in later

@@ -135,6 +135,19 @@ def test_steps_are_ordered_by_the_share_of_the_gap_and_scatter_comes_after_the_c
     assert not any("tunnel" in step for step in next_steps(answer))
 
 
+def test_a_spring_that_is_open_comes_by_its_share_as_well() -> None:
+    given = two_causes()
+    given["found"] |= {
+        "choices": [
+            {"stiffness": 44.84, "error": 0.02, "std": 1e-4, "probability": 0.5},
+            {"stiffness": 16.12, "error": -0.0196, "std": 1e-4, "probability": 0.5},
+        ]
+    }
+    first, second, *_ = next_steps(findings_of(given))
+    assert first.startswith("Measure the stiffness of both springs again (16.12 and 44.84 N m/rad)")
+    assert "friction" in second
+
+
 def test_the_removal_of_a_cause_leaves_the_scatter_and_no_more() -> None:
     """The runs' scatter, fitted first, absorbs a part of the cause; it is what remains without the cause."""
     given = scattering_document()
