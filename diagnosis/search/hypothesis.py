@@ -28,9 +28,9 @@ chance exactly as much as gravity does."""
 
 FORM_NEEDED: Final = 0.2
 """Minimum rise of χ² without a freed form, as a share of the excess, for the form to be kept. Tuned (decision
-0008)."""
+0006)."""
 FREED_HYPOTHESES: Final = 3
-"""Number of sets of one effect whose forms are freed. Judgement (decision 0008). Time against coverage."""
+"""Number of sets of one effect whose forms are freed. Judgement (decision 0006). Time against coverage."""
 GRAVITY_CANCELS: Final = 0.8
 """Maximum share of an unstated spring that gravity may cancel. Judgement (decision 0029). Beyond this share
 the two imitate a nonlinear spring. Silverbox is not an independent test."""

@@ -18,7 +18,7 @@ from tunnel_sim.vocabulary.record import Array
 
 FORM_OPEN: Final = 0.02
 """Minimum share of the excess unexplained by a textbook form for its forms to be freed. Judgement (decision
-0008)."""
+0006)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from diagnosis.settings import RandomMomentSettings
 
 WHITE_INNOVATIONS: Final = 10.0
 """Maximum deviation of the power of the innovations from white noise, by band and by quarter of a record, in
-standard deviations. Judgement (decision 0009). Chance alone gives less than 3.5. Real spectra are not
+standard deviations. Judgement (decision 0046). Chance alone gives less than 3.5. Real spectra are not
 first-order. With the true sets of unblinded campaigns it is at most 9.0."""
 BURST_POWER: Final = 1.5
 """Maximum power of short innovations of a steady moment, relative to chance. Judgement. Real turbulence is

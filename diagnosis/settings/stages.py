@@ -127,7 +127,7 @@ class SearchSettings:
         "Time. Of five campaigns with up to 80,000 readings, one was answered sooner that way, and one "
         "later.",
         unit="block means",
-        decision="0034",
+        decision="0018",
     )
     begun_on: int = setting(
         15_000,
@@ -135,7 +135,7 @@ class SearchSettings:
         "tuned",
         "Time against coverage, on Silverbox and on sealed campaigns.",
         unit="block means",
-        decision="0034",
+        decision="0018",
     )
 
 
@@ -149,7 +149,7 @@ class RandomMomentSettings:
         "judgement",
         BY_CHANCE,
         unit="χ²",
-        decision="0009",
+        decision="0046",
     )
     part_price: float = setting(
         20.0,
