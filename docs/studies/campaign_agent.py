@@ -20,7 +20,8 @@ import numpy as np
 from gymnasium.wrappers.vector import NormalizeObservation
 
 import tunnel_sim.envs  # noqa: F401  registers the environments
-from docs.studies.campaign_policies import Row, from_csv, play_all, replaced, table, to_csv
+from docs.studies.campaign_policies import Row, from_csv, play_all, table, to_csv
+from docs.studies.page_text import replaced
 from docs.studies.policies import Action
 from docs.studies.trained_policy import (
     FEATURES,

@@ -21,6 +21,7 @@ import numpy as np
 import polars as pl
 from scipy.stats import binom
 
+from docs.studies.page_text import replaced
 from docs.studies.policies import POLICIES, Policy, run_campaign
 from identification.estimate import PARAMETERS
 from identification.show.style import COLOURS, MARKERS, WIDTH, figure, grid, log_axis, save, styled
@@ -220,13 +221,6 @@ def fill(page: str, rows: Sequence[Row]) -> str:
     for preset in CONTESTS:
         page = replaced(page, preset, table(rows, preset))
     return page
-
-
-def replaced(page: str, name: str, text: str) -> str:
-    """A page with the text between ``<!-- NAME -->`` and ``<!-- end -->`` replaced."""
-    head, mark, rest = page.partition(f"<!-- {name} -->\n")
-    _, end, tail = rest.partition("<!-- end -->")
-    return f"{head}{mark}{text}\n{end}{tail}"
 
 
 def example(seed: int = 0) -> dict[str, tuple[Array, Array]]:

@@ -11,7 +11,6 @@ import argparse
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -306,7 +305,6 @@ def main() -> None:
     parts = [
         "# Measured driven records\n\nTwo published records with published models: the causes that the diagnosis "
         "names, and its predictions of motion that no fit has used.\n"
-        f"The numbers are those of the version of {date.today():%d %B %Y}. "
         "`python -m docs.studies.driven_records --data FOLDER` writes this page. Two rules of the diagnosis were "
         "made with knowledge of these records\n([decision 0029](decisions/0029-driven-runs.md)), so the records "
         "test the predictions, but not these rules.\n",

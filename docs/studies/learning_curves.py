@@ -25,7 +25,7 @@ from gymnasium.wrappers.vector import NormalizeObservation
 
 import tunnel_sim.envs  # noqa: F401  registers the environments
 from docs.studies.campaign_agent import CAMPAIGNS, TRAINING, make, model_of
-from docs.studies.campaign_policies import replaced
+from docs.studies.page_text import replaced
 from docs.studies.policies import greedy, scripted
 from docs.studies.resonant import Resonant
 from docs.studies.trained_policy import features, trained

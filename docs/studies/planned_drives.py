@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from docs.studies.campaign_policies import replaced
+from docs.studies.page_text import replaced
 from identification import identify
 from identification.uncertainty.drive_design import Limits, peak_response, plan_bound, propose_drive
 from tunnel_sim.engine.virtual_campaign import simulate_campaign

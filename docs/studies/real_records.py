@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import date
 from pathlib import Path
 
 from diagnosis import diagnose
@@ -131,7 +130,6 @@ def page(parts: Sequence[tuple[str, str]]) -> str:
     right = sum(row.endswith("right |") for row, _ in parts)
     head = (
         "# Real records\n\nThe diagnosis of measured records, compared with their sources or energy balances. "
-        f"The numbers are those of the version of {date.today():%d %B %Y}. "
         "`python -m docs.studies.real_records --data FOLDER` writes this page; the expected causes are in "
         "[real_records.py](studies/real_records.py). An answer is right if it names all of them and no others and, "
         "where no effect explains the record, names the other motion. The records marked * have no stated "
