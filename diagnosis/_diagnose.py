@@ -55,7 +55,7 @@ def diagnose(
         model: your own model, from `read_model`, whose joint is then the nominal model; or a nominal model of your
             own kind.
         settings: the numbers that weigh answers, and the rates of the tests.
-        rivals: causes from outside the vocabulary, weighed with it; their probability is added to that of
+        rivals: causes from outside the vocabulary, weighed with it; their probability is added to
             ``unknown``.
 
     Returns:
@@ -144,8 +144,8 @@ def read_model(
     Args:
         path: MJCF, or URDF that MuJoCo loads.
         joint: name of the joint recorded, the only one that moves.
-        campaign: whose records give the range of the joint.
-        free: parameters to fit, of ``inertia``, ``damping``, ``stiffness`` and ``rest``; None: those that matter.
+        campaign: its records give the range of the joint.
+        free: parameters to fit, of ``inertia``, ``damping``, ``stiffness`` and ``rest``; None: all that matter.
             For a joint without a spring, ``rest`` is a constant moment.
         asset_dir: a further folder for its includes and meshes, beside the model's own.
         actuator: name of the actuator whose control is the column ``drive``; None: the joint has only one.

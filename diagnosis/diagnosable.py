@@ -88,7 +88,7 @@ class Chosen:
 
     Args:
         examined: all runs with the right kind of motion.
-        campaign: those that one model can be fitted to.
+        campaign: runs that one model can be fitted to.
         model: that model.
         kinds: the effects to answer with; none where all runs are in limit cycles.
         left_out: runs and effects that were left out, with reasons.
@@ -113,7 +113,7 @@ def choose(
     """Choose the runs that are diagnosed together, their nominal model, and the effects to answer with.
 
     Args:
-        given: your own nominal model; None: that of the campaign's kind.
+        given: your own nominal model; None: the model of the campaign's kind.
         judged: as in `diagnosable`.
 
     Raises:
@@ -125,7 +125,7 @@ def choose(
     compared, left_out = comparable_runs(found.campaign)
     model = nominal_model(compared, given)
     if compared.sensor.derivative:
-        # Their sizes and ranges are those of angles; a mode moves the body.
+        # Their sizes and ranges are angles; a mode moves the body.
         kinds = [kind for kind in kinds if kind.channel != "sensor" or issubclass(kind, SecondOscillation)]
         tried = "no sensor effect tried" if compared.driven else "only a second mode tried"
         left_out = (*left_out, Fact(tried, {"quantity": compared.sensor.quantity}))
@@ -138,8 +138,8 @@ def choose(
 def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[Fact, ...]]:
     """Leave out the runs that cannot be fitted together with the others, with reasons.
 
-    Where some runs state ``spring_stiffness`` and others do not, the larger group remains (those that state it, if
-    equal). Among runs that do not state it, those with the same frequency at the same wind speed remain: only they
+    Where some runs state ``spring_stiffness`` and others do not, the larger group remains (if equal, the runs that
+    state it). Of runs that do not state it, only runs with the same frequency at the same wind speed remain: they
     can have one spring. A wind-on run that swings in another mode than the wind-off runs of its spring is left
     out.
     """
@@ -239,7 +239,7 @@ def refuse_undiagnosable(campaign: Campaign, given: NominalModel | None = None) 
     """Refuse driven runs that the diagnosis does not treat yet, and runs that the nominal model cannot describe.
 
     Args:
-        given: your own nominal model; None: that of the campaign's kind.
+        given: your own nominal model; None: the model of the campaign's kind.
 
     Raises:
         TunnelError: for the first such run.
@@ -272,7 +272,7 @@ def refuse_motionless(campaign: Campaign, model: NominalModel) -> None:
     """Refuse a run that shows no motion to diagnose; the estimators leave out the same free decays.
 
     Raises:
-        TunnelError: for the first run without a decaying motion, or the first driven one whose motion does not
+        TunnelError: for the first run without a decaying motion, or the first driven one that does not
             follow from its input, as an oscillation where there is a spring.
     """
     for run in campaign.decays:

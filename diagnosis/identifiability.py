@@ -36,7 +36,7 @@ class Identifiability:
 
     Args:
         share: of the effect's change of the readings that the nominal model cannot absorb, a ratio of norms.
-        cosines: absolute cosine between this change and that of another effect, by name, greatest first.
+        cosines: absolute cosine between this change and the change by another effect, by name, greatest first.
         driven: whether the runs were driven, as an effect of the input needs.
     """
 
@@ -68,7 +68,7 @@ class Identifiability:
 
 
 def identifiability(kind: type[Effect]) -> Identifiability:
-    """Compare the unabsorbed change by an effect with those of all known effects.
+    """Compare the unabsorbed change by an effect with the changes by all known effects.
 
     By linear theory at typical sizes. Effects that are not fitted as a motion (random moments, periodic effects,
     missing samples, coarse steps) are left out.

@@ -34,7 +34,7 @@ class Diagnosis(Findings):
     """The answer for people: as text, figures, a page and tables."""
 
     def in_words(self) -> Diagnosis:
-        """The answer with its text fields, and the remarks on the noise after those of the examination."""
+        """The answer with its text fields, and the remarks on the noise after the examination's."""
         found, model, unit = self.found, self.model, self.misfit.unit
         rest = self.rest and replace(self.rest, words=self.rest.in_words(self))
         place = where_words(self.where, found.place or found.nowhere, self)
@@ -65,7 +65,7 @@ class Diagnosis(Findings):
         return diagnosis_brief(self)
 
     def _repr_html_(self) -> str:
-        """The same as `__str__` for notebooks."""
+        """The text of `__str__` as HTML, for notebooks."""
         return as_notebook(printed(self))
 
     def plot(self, what: str = "fit", runs: Sequence[str] = ()) -> Figure:
@@ -74,7 +74,7 @@ class Diagnosis(Findings):
         Args:
             what: ``fit`` (the fit over the data) or the name of another figure, such as ``waterfall``, ``place``
                 or ``repeatability``.
-            runs: ids of runs for ``fit``, of which two are drawn; empty: those with the largest gap.
+            runs: ids of runs for ``fit``, two are drawn; empty: the runs with the largest gap.
 
         Returns:
             A matplotlib figure, made without pyplot.
@@ -132,7 +132,7 @@ class Diagnosis(Findings):
     def to_uncertainties(self) -> dict[str, UFloat]:
         """The coefficients after the causes are added, for the package uncertainties, with their covariance.
 
-        Those at a bound, and those that the runs do not determine, are left out.
+        Estimates at a bound, or not determined by the runs, are left out.
 
         Raises:
             TunnelError: where uncertainties, of the extra ``frames``, is not installed.

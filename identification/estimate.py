@@ -57,8 +57,8 @@ class NoiseLevel:
         source: ``stated`` (noise_std and resolution of the campaign) or ``residual`` (of the fit).
         residual_std: standard deviation of the residual, rad.
         slow_ratio: factor on the variances: 1 in white noise; in coloured noise its power at the frequency of the
-            motion over that of white noise of ``std``; where the model departs, the power of the residual's slow
-            part over that of white noise.
+            motion over the power of white noise of ``std``; where the model departs, the power of the residual's
+            slow part over the power of white noise.
         departs: whether the residual has more power than white or coloured noise beyond chance (false-alarm rate
             1e-3).
         disagrees: whether the residual's white part contradicts the stated noise.
@@ -169,7 +169,7 @@ class RunScatter:
         wind_speed: standard deviation of the runs' own speeds, a fraction; None where it does not count.
         spring_stiffness: standard deviation of the runs' own springs, a fraction; None where it does not count.
         mechanical_damping: standard deviation of their own damping, a fraction; None where it does not count.
-        stated: names of those of these three that the campaign states; the others are estimated.
+        stated: names of the sizes among these three that the campaign states; the others are estimated.
         covariances: contribution of each of the three that is not None to the covariance of the parameters, in the
             products of their units; shape (k, p, p).
     """

@@ -151,7 +151,7 @@ SCATTER_OF_RELEASE = 0.03
 """Relative scatter of the first swing about the stated release, where few runs show it: by hand. Judgement."""
 
 ODD_NOISE = 3.5
-"""Ratio of a run's noise to that of the other runs, by which it is odd: simulated runs of one sensor differ by a
+"""Ratio of a run's noise to the other runs' by which it is odd: simulated runs of one sensor differ by a
 fifth, and one run of a measured campaign in the data differs by three times from all others. Judgement."""
 
 FILTERED_NOISE = 5.0
@@ -253,7 +253,7 @@ SETTLED_SHARE = 0.9
 Judgement."""
 
 LINEAR_SHARE = 0.3
-"""Amplitude over that of the limit cycle, up to which a growth is linear: a saturation that grows as the square of
+"""Amplitude over the limit cycle's, up to which a growth is linear: a saturation that grows as the square of
 the amplitude reduces the growth rate there by 9 %, and by some 2 % on average."""
 
 # --- When a random moment is assumed. ---

@@ -1,6 +1,6 @@
 """The printing of results: numbers with their standard deviations, and an estimate in blocks.
 
-Two significant digits of the standard deviation determine those of the value.
+Two significant digits of the standard deviation determine the digits of the value.
 """
 
 from __future__ import annotations
@@ -175,7 +175,7 @@ def repeatability_lines(document: Document) -> list[str]:
         if not coefficients or 2 * len(shown) > len(coefficients):
             return []
         return [
-            f"Between runs: {'one run' if len(shown) == 1 else 'runs of which none repeats another'} cannot show a "
+            f"Between runs: {'one run' if len(shown) == 1 else 'runs without a repeat'} cannot show a "
             "scatter, so the intervals include the noise only; repeat a run, or state [repeatability]."
         ]
     stated, seen = [], []

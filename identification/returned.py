@@ -56,7 +56,7 @@ def checked_return(found: object, name: str, campaign: Campaign, of: str = "") -
         of: words for the campaign in messages; empty: its name.
 
     Raises:
-        WrongReturn: when it is not an estimate; its runs are not those of the campaign in their order; a value
+        WrongReturn: when it is not an estimate; its runs are not the campaign's in their order; a value
             is not a finite number, has another unit, or lacks its standard deviation; the covariance does not fit
             the coefficients; or it cannot be written as JSON.
     """

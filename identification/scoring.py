@@ -161,7 +161,7 @@ def mean_figure(values: Array, unit: str) -> Quantity:
 
 
 def root_mean_square(values: Array, unit: str) -> Quantity:
-    """√mean(x²) with its standard error, that of mean(x²) through the root.
+    """√mean(x²) with its standard error, propagated from mean(x²).
 
     Few squares may be alike by chance, and their scatter is then too small. The standard error is therefore
     at least the one for normal errors of this mean m and variance s²: the variance of x² is then 2 s⁴ + 4 m² s².
@@ -254,7 +254,7 @@ def changes(before: Sequence[Trials], now: Sequence[Trials]) -> tuple[Change, ..
     turned, sizes, means = [], [], []
     for old_errors, new_errors in scaled:
         both = np.concatenate((old_errors, new_errors))
-        # The direction of a cell is that of all its errors, old and new: a change in this direction is worse.
+        # The direction of a cell comes from all its errors, old and new: a change in this direction is worse.
         direction = 1.0 if both.size == 0 or both.mean() >= 0.0 else -1.0
         turned.append((direction * old_errors, direction * new_errors))
         sizes.append((np.abs(old_errors), np.abs(new_errors)))
@@ -322,7 +322,7 @@ def _larger(cells: Sequence[tuple[Array, Array]], same: bool) -> float:
         elif n and m:
             ranks = rankdata(np.concatenate((old, new)))
             # Weighted by 1/(n + m + 1) after P. van Elteren, Bull. Int. Stat. Inst. 37 (1960) 351–361; the variance
-            # is that of the actual ranks, with ties.
+            # is the variance of the actual ranks, with ties.
             weight = 1.0 / (n + m + 1)
             excess += weight * (float(ranks[n:].sum()) - m * (n + m + 1) / 2.0)
             variance += weight**2 * n * m / (n + m) * float(ranks.var(ddof=1))

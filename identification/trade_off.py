@@ -69,7 +69,7 @@ class Combination:
 
 @dataclass(frozen=True)
 class TradeOff:
-    """Two parameters of which the runs determine a combination better than either.
+    """Two strongly correlated parameters: the runs determine a combination better than either.
 
     Args:
         parameters: names of both, in the order of the fit; for effects ``effect.parameter``.

@@ -162,7 +162,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run ``tunnel`` and turn its end or exception into an exit status.
 
     Args:
-        arguments: the words after ``tunnel``; those of the process when None.
+        arguments: the words after ``tunnel``; None: the process's.
 
     Returns:
         0 success, 1 a check or an estimate failed, 2 bad input, 130 interrupted.

@@ -197,7 +197,7 @@ def size_effects(draws: Sequence[CampaignDraw], *, progress: bool = False) -> li
 OWN_EXCESS = 0.5
 """Least excess of an effect that the others cannot imitate, noise variances: 100 deviations in 10⁵ samples."""
 OWN_SHARE = 0.1
-"""That excess as a share of the whole: signatures of large effects are not exactly proportional to their size."""
+"""Least excess of its own, as a share of all: signatures of large effects are not quite proportional to size."""
 ATTEMPTS = 4
 _STRIDE = 7  # of the stored samples of the signatures
 
@@ -218,7 +218,7 @@ def size_separably(draws: Sequence[CampaignDraw], *, progress: bool = False) -> 
         sized = own_excesses(size_effects([found[i] for i in left], progress=progress))
         for number, draw in zip(left, sized, strict=True):
             found[number] = draw
-        # those with a relevant effect without an excess of its own
+        # campaigns with a relevant effect without an excess of its own
         left = [
             i
             for i in left
@@ -237,7 +237,7 @@ def own_excesses(draws: Sequence[CampaignDraw]) -> list[CampaignDraw]:
     """Set the own excess of every relevant effect.
 
     Returns:
-        The campaigns; those without effects are unchanged.
+        The campaigns; unchanged without effects.
     """
     alone: list[CampaignDraw] = []
     places: list[tuple[int, int]] = []

@@ -130,7 +130,7 @@ class TrueConditions:
         noise_tails: degrees of freedom of Student's t for the white noise; 0: it is normal.
         zero_shift: a run's own zero less the campaign's, rad.
         kept: share of the duration that is written.
-        every: number of samples of which one is written.
+        every: one of this many samples is written.
         time_start: time stamp of the first sample, s.
         gaps: stretches of every run that are not written, from and to, shares of the duration, shape (gaps, 2).
         offset: angle subtracted from all readings as written, rad.

@@ -1,1 +1,1 @@
-"""What an answer predicts: held-out readings, and its coefficients by linear theory."""
+"""Predictions of an answer: held-out readings, and its coefficients by linear theory."""

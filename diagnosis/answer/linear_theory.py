@@ -24,7 +24,7 @@ SMALL_CAUSES: Final = 3
 """Maximum number of unnamed small causes considered together, in effects. Judgement (decision 0028). Time
 against coverage."""
 SMALL_CAUSES_TRIED: Final = 8
-"""Number of effects in the sets of small causes: those that lower χ² most individually. Judgement (decision
+"""Number of effects in the sets of small causes: the ones that lower χ² most individually. Judgement (decision
 0028). Time against coverage."""
 MISFIT_DEGREES: Final = 6.0
 """Effective degrees of freedom of the error of a real model. Judgement (decision 0028). One for every channel
@@ -88,7 +88,7 @@ def move_of_halves(fit: Fit, gradient: Array) -> float:
         gradient: of the quantity to the common parameters, shape (common,).
 
     The data are halved by amplitude, by time, by wind speed and by spring, and the halves that differ most count.
-    The difference is that of one Gauss–Newton step from the fit: the scores of a fit sum to zero, so the two
+    The difference comes from one Gauss–Newton step of the fit: the scores of a fit sum to zero, so the two
     halves pull in opposite directions. If the model were right, the pull would be due to noise alone. This is the
     test of Zeileis & Hornik (Stat. Neerl. 61 (2007) 488) for parameters that change along an ordering, in the
     parameter's unit. Refitting each half would give the same answer, but is undetermined where one half shows only
@@ -191,7 +191,7 @@ def alone(fit: Fit) -> Beside:
 
 
 Starts = Sequence[tuple[type[Effect], Sequence[StartingPoint]]]
-"""Effects that may act beside those of a fit, each with its starting points."""
+"""Effects that may act beside the fitted ones, each with its starting points."""
 
 
 def starts_beside(fit: Fit, kinds: Sequence[type[Effect]]) -> Starts:
@@ -217,7 +217,7 @@ def beside(fit: Fit, starts: Starts) -> Beside:
 
     Args:
         fit: with or without effects.
-        starts: the effects that may act beside those of the fit.
+        starts: the effects that may act beside the fitted ones.
     """
     gradients, settings = coefficient_gradients(fit), fit.settings.answer
     influence = influences(fit)
@@ -316,7 +316,7 @@ def _step(
 ) -> _Step | None:
     """Add the effects with some indices; None where they change the readings alike, or a size is out of range.
 
-    ``gram`` has the products of the causes' changes, shape (causes, causes), ``score`` those with the residuals.
+    ``gram`` has the products of the causes' changes, shape (causes, causes), ``score`` with the residuals.
     ``form_std`` is the standard deviation of a move due to the form, as a share of it.
     """
     own = gram[np.ix_(chosen, chosen)]

@@ -142,7 +142,7 @@ class RunDeviations:
 
     Args:
         fitted: the fit of the answer.
-        scatter: all differences that the runs could show; those of the fit have its widths.
+        scatter: all differences that the runs could show; the fitted ones have the fit's widths.
         columns: of the fit with all of them.
         kept: indices of the fit's own differences among them.
     """
@@ -232,7 +232,7 @@ class RunDeviations:
         """Parameters that differ between the runs and follow their order, or a condition of the plan.
 
         The drift is a further common parameter: a run's own stiffness and damping change in proportion to its
-        place in the campaign, or to the condition. Widths are those beside the drift.
+        place in the campaign, or to the condition. Widths are fitted beside the drift.
         """
         places = [place for place in self.kept if self.scatter[place].shown]
         rate = self.fitted.settings.scatter.trend_rate

@@ -1,1 +1,1 @@
-"""Findings: what a diagnosis states, each with its numbers, words, tables and figure."""
+"""Findings of a diagnosis, each with its numbers, words, tables and figure."""

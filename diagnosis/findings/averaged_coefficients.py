@@ -38,7 +38,7 @@ from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
 
 SKEWED_FROM: Final = 0.1
-"""Deviation of the ends of the interval from those of a normal distribution above which the interval is
+"""Deviation of the ends of the interval from a normal distribution's ends above which the interval is
 stated, in standard deviations. Judgement."""
 SMALL_CAUSES_FROM: Final = 0.05
 """Minimum probability of an answer for small causes beside it. Judgement."""
@@ -113,7 +113,7 @@ class Possible:
     """An answer with its fit.
 
     Args:
-        probability: of the answer, a fraction; those of all answers need not sum to 1.
+        probability: of the answer, a fraction; over all answers they need not sum to 1.
         textbook: the same effects in textbook form, where the fit freed their forms.
         small: the small causes that may act beside them; None: neither these nor a misfit are considered.
     """
@@ -191,9 +191,9 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, Quantity]:
         campaign: gives the digits to which the air density is stated.
 
     Returns:
-        By the names of the nominal model's coefficients; ``omega_n`` and ``zeta`` are those of small swings. Their
+        By the names of the nominal model's coefficients; ``omega_n`` and ``zeta`` hold for small swings. Their
         distribution is a mixture over the answers and over the sets of small causes beside them
-        (`diagnosis.answer.linear_theory`), with their probabilities; value and deviation are those of its centre
+        (`diagnosis.answer.linear_theory`), with their probabilities; value and deviation describe its centre
         (`Central`).
 
         The variance within an answer is the sum of
@@ -271,7 +271,7 @@ def as_identified(
     """The coefficients with the values and deviations of an estimate of the same runs, in the similar campaign.
 
     Without a cause both fit the same model to the same readings, so there is one number for each coefficient. A
-    coefficient that the estimate does not state is unchanged; ωn and ζ are those of the only run.
+    coefficient that the estimate does not state is unchanged; ωn and ζ come from the only run.
     """
     runs = estimate.runs if len(estimate.runs) == 1 else ()
     repeatability, same = estimate.repeatability, dict(found)
@@ -348,7 +348,7 @@ class Central:
 
     Args:
         value: mean of the part within the central interval.
-        std: half the length of the central interval over that of a standard normal distribution.
+        std: half the length of the central interval, over the same half of a standard normal distribution.
         interval: the ends of the interval where it is not the one of a normal distribution; else None.
     """
 

@@ -79,7 +79,7 @@ def meant_parameter(found: Quantity, info: ParameterInfo, swing: float, undeterm
         undetermined: standard deviation over value and usual size from which it is meaningless, a ratio.
 
     Returns:
-        The estimate; not determined where its standard deviation exceeds that of a uniform distribution over the
+        The estimate; not determined where its standard deviation exceeds a uniform distribution's over the
         allowed range, or that multiple of the parameter's value and usual size.
     """
     lower, upper = info.fit_range(swing)
@@ -96,7 +96,7 @@ def meant_coefficient(estimate: Quantity, fit: Fit, name: str) -> Quantity:
 
     Returns:
         The estimate; not determined where its standard deviation exceeds ωn itself, a damping ratio of 1, or the
-        coefficient whose moment is that of the stiffness or of the critical damping in the fastest wind.
+        coefficient whose moment equals the stiffness's or the critical damping's in the fastest wind.
     """
     if name == "omega_n":
         return _limited(estimate, abs(estimate.value))
@@ -130,7 +130,7 @@ def candidates(study: Study, base: Base, errors: Mapping[str, float] = {}) -> tu
     """The answers, with their residual gap in the fitted runs by the fits' own integrator.
 
     Args:
-        errors: standard deviations of the answer's parameters beside those of the noise, by ``effect.parameter``,
+        errors: further standard deviations of the answer's parameters, not due to noise, by ``effect.parameter``,
             in their units.
 
     Returns:
@@ -251,11 +251,11 @@ def _parameters(
 
 
 def parameter_errors(study: Study, closes: Closing) -> dict[str, float]:
-    """Standard deviations of the parameters of the answer beside those of the noise, by ``effect.parameter``.
+    """Further standard deviations of the answer's parameters, not due to the noise, by ``effect.parameter``.
 
     Returns:
-        In the parameters' units, those of the similar campaign. They are the change by MuJoCo's integrator, where
-        it and that of the fits disagree; and the difference between the halves of the data, which differ by more
+        In the parameters' units of the similar campaign. They are the change by MuJoCo's integrator, where
+        it and the fits' integrator disagree; and the difference between halves of the data, which differ by more
         than chance where the form of a cause is not exact (`move_of_halves`).
     """
     fit = study.chosen

@@ -1,4 +1,4 @@
-"""The causes in words: first those that are certain, then the open ones; their sizes and consequences."""
+"""The causes in words: first the certain ones, then the open ones; their sizes and consequences."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class NamedCauses:
         ambiguous_with: effects that the runs cannot distinguish from the causes.
         candidates: the answers considered, the answer first.
         inclusion: by effect, the probability that it is among the causes.
-        choices: springs of which one may be off.
+        choices: springs; one of them may be off.
         robot: whether the body is the joint of a machine.
         rivals_from: least probability of a rival that is named.
     """
@@ -46,7 +46,7 @@ class NamedCauses:
         """The causes common to the likely answers, each with its probability, and the alternatives beside them.
 
         Args:
-            sized: whether springs of which one is off are given with their errors; False where another sentence
+            sized: whether the springs, one of them off, are given with their errors; False where another sentence
                 does so.
 
         Returns:
@@ -94,7 +94,7 @@ class NamedCauses:
         return kind.phrase(values, stds, text)
 
     def advice(self, name: str) -> str:
-        """What to do about a cause, with the values that it names, without a full stop."""
+        """The remedy of a cause, with the values that it names, without a full stop."""
         kind = {kind.name: kind for kind in known_effects()}.get(name)
         said = "" if kind is None else (self.robot and kind.advice_for_joint) or kind.advice
         if not said:

@@ -47,7 +47,7 @@ def _few_runs(given: Figures) -> str:
 def _none_held_out(given: Figures) -> str:
     each = "spring, with the wind off and on" if given["windy"] else "run"
     return (
-        "No run could be held out of the fit, so the explained share is that of the fitted runs. The "
+        "No run could be held out of the fit, so the explained share is for the fitted runs. The "
         f"gap as the causes are added is predicted for held-out stretches of time. Repeat every {each}: a held-out "
         "run is a stronger test than a stretch."
     )
@@ -121,7 +121,7 @@ CAUTIONS: Mapping[str, Sentence] = {
     "gap with the causes is the gap of the fit. Repeat these runs.",
     "cut": "The nominal model fits poorly, so each record is used only from its second passage through the centre "
     "until its motion ends. A start by hand and a body at rest are not free decays. The coefficients before the "
-    "causes may therefore differ from those of identify, which uses the whole record.",
+    "causes may therefore differ from identify's, which uses the whole record.",
     "unresolved": _unresolved,
     "one amplitude": lambda given: (
         "Not determined: one release amplitude does not show whether the form of a law is right, so "
@@ -182,7 +182,7 @@ REMARKS: Mapping[str, tuple[Sentence, str]] = {
     ),
     "harmonic of the hum": (
         "the strongest line of the hum is at {line_hz:.5g} Hz, {harmonic} times the mains' frequency",
-        "the stated amplitude is that of this line",
+        "the stated amplitude is this line's",
     ),
     "folded hum": (
         lambda given: (

@@ -44,9 +44,9 @@ class Closing:
 
     Args:
         gap: before and after, by MuJoCo.
-        steps: the same as the causes are added.
+        steps: the gap as the causes are added.
         seconds: wall time by step, s.
-        shifts: MuJoCo's readings of the answer's model minus those of the fits, in noise standard deviations of
+        shifts: MuJoCo's readings of the answer's model minus the fits' readings, in noise standard deviations of
             block means, by run id.
     """
 
@@ -120,7 +120,7 @@ class Comparison:
 
     Args:
         ids: of the runs.
-        residuals: reading minus the MuJoCo model's block means, in noise standard deviations, by run; those of the
+        residuals: reading minus MuJoCo's block means, in noise standard deviations, by run; the residuals of the
             forward integrator where MuJoCo could not integrate the motion.
         differences: MuJoCo's block means minus the forward integrator's, rad, by run.
         noise: standard deviation of a block mean's noise, rad, by run.
@@ -238,7 +238,7 @@ class Reported:
         after: of the answer's model, held out where possible, else from its fit to all runs.
         held_out: ids of the runs that could be held out.
         confirmation: agreement of MuJoCo and the fits' integrator on these.
-        shifts: MuJoCo's block means of the answer's model minus those of the fits' integrator.
+        shifts: MuJoCo's block means of the answer's model minus the block means of the fits' integrator.
     """
 
     before: Mapping[str, Array]

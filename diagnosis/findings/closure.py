@@ -37,7 +37,7 @@ class RunGap:
         before: ratio of mean squared residual to noise variance, minus one, of the nominal model, predicted from
             the other runs where the run could be held out.
         after: the same ratio minus one with the causes added.
-        held_out: whether the run could be held out; else both are those of the fits of all runs.
+        held_out: whether the run could be held out; else both come from fits of all runs.
     """
 
     id: str
@@ -76,7 +76,7 @@ class GapSummary:
     closed_ahead: float | None = None
 
     def to_json_dict(self) -> dict[str, Any]:
-        """Fields by name, and in ``misfit`` those of `Misfit` and the root mean squares before and after."""
+        """Fields by name; ``misfit`` has the fields of `Misfit` and the root mean squares before and after."""
         found = {name: as_json(getattr(self, name)) for name in self.__dataclass_fields__}
         before, after = self.misfit.rms(self.excess_before), self.misfit.rms(self.excess_after)
         found["misfit"] |= {"before": before, "after": after}
@@ -108,7 +108,7 @@ class Confirmation:
     failure: str = ""
 
     def scaled(self, factor: float) -> Confirmation:
-        """The same with all readings times a factor: from a similar rig's to the measured one's."""
+        """This gap with all readings times a factor: from a similar rig's to the measured one's."""
         return replace(
             self,
             largest_difference=self.largest_difference * factor,
@@ -207,7 +207,7 @@ def waterfall_table(waterfall: Waterfall, misfit: Misfit) -> TextTable:
 
 
 def shares_of_gap(waterfall: Waterfall) -> dict[str, tuple[float, str]]:
-    """By cause, its share of the gap as the causes are added, and those with which it was added.
+    """By cause, its share of the gap as the causes are added, and the causes added in the same step.
 
     Chance differences between the runs come last: they remain where a cause is removed from the rig. The fit of the
     waterfall adds them first, where they absorb a part of the causes.

@@ -101,7 +101,7 @@ def coefficients_table(given: Coefficients, judged: Judged) -> TextTable:
 def _rows(given: Coefficients) -> Iterator[tuple[str, Quantity | None, Quantity | None]]:
     """Label of a coefficient, and its estimates by the nominal model and with the causes.
 
-    The nominal model has no lag, so with a named lag its coefficients compare with those in phase.
+    The nominal model has no lag, so with a named lag its coefficients compare with the derivatives in phase.
     """
     before, after = given.before, given.after
     phase = given.in_phase
@@ -165,7 +165,7 @@ def budget_table(given: Coefficients) -> TextTable:
 
 
 def coefficients_line(given: Coefficients) -> str:
-    """Contributions to the coefficients' standard deviations that those of ``identify`` do not include.
+    """Contributions to the coefficients' standard deviations that ``identify`` does not include.
 
     Empty where none is known.
     """

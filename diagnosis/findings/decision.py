@@ -17,7 +17,7 @@ PREDICTED_FROM: Final = 0.1
 """Minimum share of the gap on held-out readings that a decided answer must explain. Judgement. An answer that
 predicts less is fitted to chance."""
 LEFT_OF_SWING: Final = 0.1
-"""Maximum root mean square residual of a decided answer, as a share of that of the readings about their mean.
+"""Maximum root mean square residual of a decided answer, as a share of the readings' own about their mean.
 Judgement. A model that misses a tenth of the motion lacks a part of it."""
 ANSWERS_NAMED: Final = 5
 """Maximum number of likely answers in a sentence. Judgement."""
@@ -71,7 +71,7 @@ class Predictions:
         ahead: share of the gap in the later half of driven runs that it explains, fitted to the earlier half.
         patched: share of the gap that the user's model explains, with the answer written into it.
         under_load: share of the gap that friction under the load of an actuator leaves.
-        left: root mean square residual over that of the readings about their mean, a ratio.
+        left: root mean square residual over the readings' root mean square about their mean, a ratio.
         elsewhere: whether the residuals show a place at which none of its causes acts.
     """
 

@@ -1,4 +1,4 @@
-"""Disturbed runs: what is used of them, and what to do about them, in words."""
+"""Disturbed runs: the parts that are used, and remedies, in words."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def disturbed_words(found: Disturbance, *, no_gap: bool) -> str:
 
 
 def disturbed_step(found: Disturbance) -> NextStep:
-    """What to do about a disturbed run."""
+    """The remedy for a disturbed run."""
     again = "all its readings then count"
     if found.at_s is not None:
         return NextStep(f"Repeat run {found.run}, which was disturbed at {found.at_s:.4g} s", again)

@@ -152,7 +152,7 @@ class NextStep:
 
     Args:
         what: to do, a sentence without its full stop.
-        gain: what it buys, a clause such as ``removes 98 % of the gap``; empty where the step says so itself.
+        gain: of the step, a clause such as ``removes 98 % of the gap``; empty where the step says so itself.
     """
 
     what: str

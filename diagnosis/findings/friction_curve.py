@@ -137,7 +137,7 @@ def _law(fit: Fit, place: int, rates: Rates) -> tuple[Array, Array]:
     """The law of an effect at some rates with its standard deviation, by the covariance of its parameters.
 
     Args:
-        place: index of the effect among those of the fit.
+        place: index of the effect in the fit.
 
     Returns:
         Both in N m, shape (n,).
@@ -181,7 +181,7 @@ class _Passed:
 def _strokes(fit: Fit) -> list[_Passed]:
     """The strokes of every run that has some.
 
-    A stroke's loss in the records differs from that in the fitted model by the error of the friction law. All
+    A stroke's loss in the records differs from its loss in the fitted model by the error of the friction law. All
     other losses are equal in both, as are the errors of the reversals.
     """
     problem, found = fit.problem, []
@@ -233,7 +233,7 @@ def _binned(runs: Sequence[_Passed], effect: Effect) -> list[FrictionPoint]:
 
 
 def _point(group: Array) -> FrictionPoint:
-    """The mean by the inverse variances; its error is that of the noise or of the scatter, whichever is greater."""
+    """The mean by the inverse variances; its error is the larger of the noise's and the scatter's."""
     rate, moment, error, count = group.T
     weight = np.maximum(error, 1e-300) ** -2.0
     total, mean = float(weight.sum()), float(weight @ moment / weight.sum())

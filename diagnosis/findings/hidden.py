@@ -68,7 +68,7 @@ class Hidden:
 
 
 def hidden_effects(fit: Fit, starts: Starts, left: Sequence[Array] | None = None) -> tuple[Hidden, ...]:
-    """Upper limits on effects beside those of a fit, two standard deviations from the likeliest size.
+    """Upper limits on effects beside the fitted ones, two standard deviations from the likeliest size.
 
     The change of the readings that the other parameters cannot absorb is a polynomial in the size: of second order
     where the effect states that its first order is absorbed, else of first order. χ² at every size follows from
@@ -77,7 +77,7 @@ def hidden_effects(fit: Fit, starts: Starts, left: Sequence[Array] | None = None
 
     Args:
         fit: with or without effects.
-        starts: the effects that may act beside those of the fit.
+        starts: the effects that may act beside the fitted ones.
         left: scaled residuals for the dispersion, by run, where small causes beside the fit explain a part of its
             own; each of shape (n,).
 
@@ -206,10 +206,10 @@ def _changes(fit: Fit, start: StartingPoint, there: Array) -> Array:
 _REFITS = 10
 _STEPS = 10  # of a refit, which starts at the fit
 _TOLERANCE = 1e-6  # of its χ², so that rises of a few units compare
-_CONFIRMED = 0.1  # greatest distance of a rise from that of the limit, as a share of it
+_CONFIRMED = 0.1  # greatest distance of a rise from the limit's rise, as a share of the latter
 _CLOSE = 1.1  # greatest factor from a size within the limit to one beyond it that confirms it
 _WIDEST = 10.0  # greatest factor between two sizes that are refitted
-_LEAST_RISE = 1e-3  # as a share of that of the limit
+_LEAST_RISE = 1e-3  # as a share of the limit's rise
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,7 +246,7 @@ def _largest(fit: Fit, start: StartingPoint, influence: Sequence[Array], reach: 
 def _within(
     fit: Fit, start: StartingPoint, influence: Sequence[Array], reach: float, least_share: float
 ) -> _Size | None:
-    """As `_largest`, by a polynomial fitted at the size of the starting point and at half of it."""
+    """Like `_largest`, by a polynomial fitted at the size of the starting point and at half of it."""
     assert start.scaled is not None
     size = float(start.point.common[start.scaled])
     least, greatest = size_range(start)

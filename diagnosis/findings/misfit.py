@@ -33,7 +33,7 @@ class Misfit:
         return self.noise * math.sqrt(max(excess, 0.0))
 
     def of_swing(self, excess: float) -> float | None:
-        """The same as a share of the swing; None where the readings do not move."""
+        """The misfit as a share of the swing; None where the readings do not move."""
         return self.rms(excess) / self.swing if self.swing > 0.0 else None
 
     def rms_words(self, excess: float) -> str:

@@ -1,4 +1,4 @@
-"""Runs to make: the one that would distinguish two fitted models, and those that narrow a coefficient."""
+"""Runs to make: one that would distinguish two fitted models, and runs that narrow a coefficient."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class NextRun(PlannedRun):
     def between(cls, first: Fit, second: Fit) -> NextRun | None:
         """The run that separates two models, fitted to the same runs.
 
-        The rig can make it: springs, wind speeds and angles are those of its runs.
+        The rig can make it: its runs have the same springs, wind speeds and angles.
 
         Returns:
             None where no stiffness is known, and where a free decay does not show the question: every run is
@@ -146,7 +146,7 @@ class FurtherRuns(PlannedRun):
     def narrowing(cls, fit: Fit, after: Mapping[str, Quantity]) -> FurtherRuns | None:
         """The runs that narrow the widest coefficient most, as few as bring its interval to `WIDE`.
 
-        The rig can make them: springs, wind speeds and the largest angle are those of its runs.
+        The rig can make them: its runs have the same springs, wind speeds and largest angle.
 
         Args:
             after: the coefficients of the answer, in any units.
@@ -334,7 +334,7 @@ def _planned(fit: Fit, runs: tuple[RunData, ...], angle: float) -> tuple[Problem
 
 
 def _turning(problem: Problem) -> NDArray[np.bool_]:
-    """Of the effects with a parameter in every run, those for which it is a phase."""
+    """The effects with a phase as a parameter of every run."""
     own = [kind for kind in problem.effects if issubclass(kind, OwnNumbers)]
     return np.array([issubclass(kind, Periodic) for kind in own], bool)
 

@@ -1,4 +1,4 @@
-"""What to do next: steps for the rig, each with its expected gain, ordered by what they buy."""
+"""The next steps for the rig, each with its expected gain, the greatest gain first."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from tunnel_sim.vocabulary.errors import counted
 
 
 def next_steps(answer: Findings) -> list[str]:
-    """What to do next, in the order in which to do it."""
+    """The next steps, in order."""
     return [step.words for step in steps(answer)]
 
 
 def steps(answer: Findings) -> list[NextStep]:
-    """What to do next: the causes by their shares of the gap, then what narrows the answer and the coefficients.
+    """The next steps: the causes by their shares of the gap, then runs that narrow the answer and the coefficients.
 
     Without a cause to act on, runs that do not count come first.
     """
@@ -74,7 +74,7 @@ _NO_REPAIR = NextStep(
 
 
 def _mending(answer: Findings) -> Iterator[NextStep]:
-    """What to do about each cause, and what tells open causes apart, the largest share of the gap first."""
+    """Remedies of the causes, and runs that separate open causes, the largest share of the gap first."""
     parts = shares_of_gap(answer.waterfall)
     of_spring = {kind.name for kind in known_effects() if kind.chosen_spring()}
     certain = answer.named_causes.certain_and_open()[0] if answer.ambiguous_with else answer.causes
@@ -101,7 +101,7 @@ def _part(parts: dict[str, tuple[float, str]], names: Sequence[str]) -> float:
 
 
 def _gain(answer: Findings, name: str, parts: dict[str, tuple[float, str]]) -> str:
-    """What the removal of a cause buys; empty where it is not known."""
+    """The gain from removing a cause; empty where it is not known."""
     if name in SCATTERS:
         spread = next((one for one in answer.repeated.spreads if one.effect == name), None)
         width = "" if spread is None else f"; now they scatter by {width_text(spread)}"
@@ -135,7 +135,7 @@ _VISIBLE = 0.01  # of a coefficient: a smaller change is not worth a word
 
 
 def _expected(answer: Findings) -> str:
-    """What a further diagnosis should find."""
+    """The expected result of a further diagnosis."""
     gap = answer.gap
     before, after = (gap.misfit.words(value) for value in (gap.excess_before, gap.excess_after))
     if answer.rest is None or not answer.rest_is_significant:
@@ -190,7 +190,7 @@ def rival_lines(answer: Findings) -> list[str]:
 
 
 def _telling_apart(answer: Findings) -> Iterator[NextStep]:
-    """What tells the alternatives of a decided answer apart."""
+    """Steps that separate the alternatives of a decided answer."""
     gain = _narrower(answer, "rivals")
     run = run_to_make(answer)
     if run is not None and answer.ambiguous_with:
@@ -201,7 +201,7 @@ def _telling_apart(answer: Findings) -> Iterator[NextStep]:
 
 
 def _deciding(answer: Findings) -> Iterator[NextStep]:
-    """What decides between the likely answers."""
+    """Steps that decide between the likely answers."""
     if answer.decision.in_doubt_of_place:
         runs = runs_of_the_gap(answer.where, answer.found.place)
         yield NextStep(
@@ -239,7 +239,7 @@ def _look(answer: Findings) -> NextStep:
 
 
 def _remedies(remarks: Sequence[Remark]) -> list[NextStep]:
-    """What to do about runs that are left out or refused, or whose units are wrong, each remedy once.
+    """Remedies for runs that are left out or refused, or have wrong units, each once.
 
     A cut run is used and needs nothing.
     """
@@ -274,7 +274,7 @@ _NARROWS = {
     "freed form": "Add runs with other {other}",
     "air density": "State the air density to one more digit",
 }
-"""What narrows an interval, by the source of most of its variance, where a step on the rig does."""
+"""The steps on the rig that narrow an interval, by the source of most of its variance."""
 _CUT = {"noise": 0.75, "scatter": 0.75}
 """Share of a source's variance that the step removes: four times the runs leave a quarter. Others: all at most."""
 

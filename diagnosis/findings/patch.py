@@ -48,7 +48,7 @@ def corrected(model: PatchedModel | None, judged: Judged) -> list[tuple[WrittenA
 
 
 def model_words(model: PatchedModel | None, judged: Judged) -> str:
-    """Differences of the values in the model's file from those of the runs, in a sentence; empty without any."""
+    """Differences between the values in the model's file and in the runs, in a sentence; empty without any."""
     said = []
     for one, std in corrected(model, judged):
         before, unit = significant(one.before[0], 3), unit_mark(one.unit.split(",")[0])
@@ -58,7 +58,7 @@ def model_words(model: PatchedModel | None, judged: Judged) -> str:
 
 
 def model_steps(model: PatchedModel | None, judged: Judged) -> list[NextStep]:
-    """What to do where the values in the model's file do not fit; none where they fit."""
+    """Remedies where the values in the model's file do not fit; none where they fit."""
     if model is None or not corrected(model, judged):
         return []
     names = listed([one.name for one, _ in corrected(model, judged)])

@@ -143,7 +143,7 @@ def remainder(
         stated: the coefficients of the answer's fit with their standard deviations.
         moved: by the same names, their moves by the remainder (`coefficient_move`), in their units.
         excess: on held-out readings, in noise variances of a sample.
-        hidden: the effects that could hide beside the answer; those without a limit do not count.
+        hidden: the effects that could hide beside the answer; effects without a limit do not count.
     """
     random, chosen = study.random, study.settings.answer
     if random is not None:  # its runs have innovations
@@ -153,7 +153,7 @@ def remainder(
         p_value = float(chdtrc(both.size, both @ both))
     elif study.chosen is study.nominal:
         p_value = study.gap.test.p_value
-    else:  # no cause changes the tests of the noise itself: those of the residuals count
+    else:  # no cause changes the tests of the noise itself: the tests of the residuals count
         noise = study.prepared.noise.rounded(study.chosen, study.prepared.step)
         p_value = gap_test(study.chosen, noise, study.prepared.trend, coarse_step=True).p_value
     hidden = [one for one in hidden if one.size.determined]
@@ -203,7 +203,7 @@ def closable_words(found: Closable | None, judged: Judged) -> str:
 
 
 def _largest(found: Closable, ceilings: Sequence[Ceiling], left: str) -> list[str]:
-    """The share of the kind beside those of the others, its place, and its formula."""
+    """The share of the kind beside the other kinds' shares, its place, and its formula."""
     kind, where, law = found.kind, found.events, found.law
     best = next(one for one in ceilings if one.kind == kind)
     sentences = [

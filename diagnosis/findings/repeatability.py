@@ -228,10 +228,8 @@ class RunRepeatability:
         )
         poorly = _told_apart(self.spreads)
         named = {SCATTERS[name] for name in scattering(judged.causes)}
-        if poorly and "wind_speed" not in named:  # whose advice includes this
-            steps.append(
-                NextStep("Log the wind speed of every run", "tells its scatter from that of the spring")
-            )
+        if poorly and "wind_speed" not in named:  # its advice includes this
+            steps.append(NextStep("Log the wind speed of every run", "tells its scatter from the spring's"))
         return steps
 
     def line(self, judged: Judged) -> str:

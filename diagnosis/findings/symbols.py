@@ -36,7 +36,7 @@ _OF_OTHERS: Mapping[str, tuple[str, ...]] = {"½ρV²Al": ("ρ", "V", "A", "l"),
 def symbol_rows(
     causes: Collection[str], coefficients: Iterable[str], parameters: Iterable[str]
 ) -> list[tuple[str, str]]:
-    """Symbols of coefficients and causes, and those that explain them, with meaning and unit.
+    """Symbols of coefficients and causes, and the symbols that explain them, with meaning and unit.
 
     Args:
         parameters: fitted ones of the causes, by full name.

@@ -30,7 +30,7 @@ BANDS = {
     "3f0": "at three times its frequency",
     "above": "faster than its third harmonic",
 }
-"""Bands of frequency, in multiples of that of the motion."""
+"""Bands of frequency, in multiples of the motion's frequency."""
 
 
 MISFITS = {
@@ -85,7 +85,7 @@ BETWEEN_RUNS = "scatter between runs"
 
 
 def without_scatter(names: Iterable[str]) -> list[str]:
-    """Causes proper: those that are not chance differences between runs."""
+    """Causes proper, without chance differences between runs."""
     return [name for name in names if name not in SCATTERS]
 
 

@@ -1,4 +1,4 @@
-"""The two parameters of a fit that the runs separate least, among those of the nominal model and the effects."""
+"""The most strongly correlated pair of parameters of a fit, of the nominal model or of the effects."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def _together(fit: Fit, campaign: Campaign, pair: tuple[str, str]) -> Combinatio
 
 
 def _own_scale(fit: Fit, campaign: Campaign, name: str) -> tuple[float, str]:
-    """Factor from a fit's parameter to the same in the units of the measured campaign, and its unit there."""
+    """Factor from a fit's parameter to its value in the units of the measured campaign, and its unit there."""
     data, (given,) = fit.problem.data, [one for one in fit.problem.parameters.common if one.name == name]
     one = Quantity(1.0, None, given.unit)
     if not given.effect:

@@ -20,8 +20,8 @@ def parameter_unit(name: str, campaign: Campaign, model: NominalModel) -> str:
     """The unit of an effect's parameter as identified.
 
     Returns:
-        The parameter's own unit, divided by that of Izz where the nominal model is per unit inertia, and
-        multiplied by those of the frontal area, the reference length and the air density where these are not
+        The parameter's own unit, divided by the unit of Izz where the nominal model is per unit inertia, and
+        multiplied by the units of the frontal area, the reference length and the air density where these are not
         stated.
     """
     effect, _, parameter = name.partition(".")

@@ -1,4 +1,4 @@
-"""What the gap costs: the moments of the air without the causes and with them, at the campaign's top wind speed."""
+"""The cost of the gap: the moments of the air without and with the causes, at the campaign's top wind speed."""
 
 from __future__ import annotations
 

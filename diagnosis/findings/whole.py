@@ -75,7 +75,7 @@ class Found:
         driven: whether every run is driven.
         nearly: effects that nearly explain an unexplained gap; None where there are none.
         immaterial: by coefficient, the relative change by the causes, where they change none materially.
-        choices: springs of which one may be off, the likeliest first.
+        choices: springs, one of them off; the likeliest first.
         hold: a delay of the input that another hold between samples explains as well; None: none.
         rivals: causes from outside the vocabulary that would explain a gap of unknown cause.
         second_modes: by run, where the gap is not explained.

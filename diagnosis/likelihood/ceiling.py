@@ -51,7 +51,7 @@ class Ceiling:
         return self.std < KNOWN_TO and self.closed < CLOSES_AT_MOST
 
 
-_WIDTHS = np.geomspace(1e-5, 1e3, 33)  # prior standard deviations tried, in that of a column of unit response
+_WIDTHS = np.geomspace(1e-5, 1e3, 33)  # prior standard deviations tried, over a unit response's column
 _TINY = 1e-10
 
 

@@ -92,7 +92,7 @@ def slow(residuals: list[Array], counts: list[int], chosen: SelectionSettings) -
         blocks = residual[: residual.size // count * count].reshape(-1, count)
         inside = blocks - blocks.mean(axis=1, keepdims=True)
         lost, freedom = lost + float(np.sum(inside**2)), freedom + blocks.size - len(blocks)
-        window = np.hanning(residual.size)  # whose leakage from the motion does not reach fast lines
+        window = np.hanning(residual.size)  # its leakage from the motion does not reach fast lines
         spectrum = np.fft.rfft(residual * window)[int(_FAST * residual.size / count) : -1]
         power = 2.0 * np.abs(spectrum) ** 2 / float(window @ window)  # χ² with two degrees of freedom
         lines, tried = max(lines, float(power.max())), tried + power.size

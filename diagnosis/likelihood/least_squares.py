@@ -317,7 +317,7 @@ class _State:
         self.products: Products | None = None
 
     def linearise(self, base: Fit | None) -> None:
-        """Compute sensitivities, reusing those of a smaller fit where given."""
+        """Compute sensitivities, reusing a smaller fit's where given."""
         known = None if base is None else base.jacobian
         self.jacobian = sensitivities(self.problem, self.here.point, known, self.here.prediction)
         if not all(np.all(np.isfinite(c)) and np.all(np.isfinite(r)) for c, r in self.jacobian):

@@ -71,7 +71,7 @@ class MainsLine(SpectralLine):
         trials: number of independent places at which mains lines were sought, over all lines.
         powers: drop of χ² of every run concerned, dimensionless, shape (concerned,).
         pieces: number of pieces of every run concerned, shape (concerned,).
-        later: power in the later halves of these runs over that in the earlier halves, dimensionless.
+        later: power in the later halves of these runs over the power in the earlier halves, dimensionless.
         evidence: drop of χ² beyond chance, at all visible multiples of the frequency, dimensionless.
         folds: number of times the line is folded, in the run of the lowest sample rate.
         beside: p-value of the clearest lower multiple that is visible; 1 where none is.
@@ -154,7 +154,7 @@ def mains_interval(similarity: Similarity) -> float:
 
 
 def alike(frequency: float, harmonic: int, intervals: list[float]) -> float | None:
-    """The mains' frequency of the other nominal value whose line coincides in all records; None: there is none.
+    """The other nominal frequency of the mains, if its line coincides in all records; else None.
 
     Args:
         frequency: of the mains, Hz of the rig as measured.
@@ -349,7 +349,7 @@ def _line(
     spectra = [whole[i] for i in concerned]
     refined = _refined(among, spectra, place)
     orders = [run.of_motion(refined) for run in among]
-    if all(orders):  # at a multiple of every run's motion, none of which is far above all others
+    if all(orders):  # at a multiple of every run's motion, and none stands far above all others
         floor = max(floor, sum(run.multiples(order) for run, order in zip(among, orders, strict=True)))
     sines = _sines(among, spectra, refined)
     phases = np.zeros(len(runs))

@@ -33,7 +33,7 @@ from tunnel_sim.physics.steps import compensated, fit_stride, fit_substeps, inpu
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig
 
-_TOGETHER = 16  # motions in a part of the work, a multiple of those that the integrator takes side by side
+_TOGETHER = 16  # motions in a part of the work, a multiple of the integrator's number side by side
 _STEPS_OF_A_THREAD = 3e4  # in a part: about a millisecond, several times its overhead
 _SOFT_ROD = 2e-5  # rad/(N m): the ringing of a stiffer rod at the release is below the noise
 #: Parameters of the law without effect in still air, and fields of a run that point to samples.
@@ -172,7 +172,7 @@ class CompiledRuns:
     def alike(self) -> list[list[int]]:
         """Indices of the runs grouped by equal motion: equal law, release and samples.
 
-        Constant arrays are those of inputs, of which equal ones are one object.
+        Constant arrays are inputs; equal inputs are one object.
         """
         numbers = self.rows.copy()
         for name in _POINTERS:

@@ -104,7 +104,7 @@ class Path:
 
     @property
     def stiffness(self) -> float:
-        """Stiffness of the spring, stated or fitted, N m/rad; that of the rig at rest without a spring."""
+        """Stiffness of the spring, stated or fitted, N m/rad; without a spring, the rig's stiffness at rest."""
         return self._stated.spring_stiffness or float(linear_coefficients(self.fit, self.index)[2])
 
     @property

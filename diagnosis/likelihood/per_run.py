@@ -67,7 +67,7 @@ def ringing(fit: Fit) -> Sought | None:
         Amplitude (rad), angular frequency (rad/s) and damping ratio with every run's phase; None where no
         frequency is distinct from the motion.
 
-    A run does not count where the frequency is that of its own motion, or a multiple. At least half of the
+    A run does not count where the frequency is its own motion's, or a multiple of it. At least half of the
     runs must count: springs and winds differ, so a line near the motion of one run is distinct in another.
     """
     runs = fit.problem.data.runs

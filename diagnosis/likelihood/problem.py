@@ -100,7 +100,7 @@ class Problem:
 
     @property
     def carries_load(self) -> bool:
-        """Whether the joint carries a moment that varies: gravity's, or that of an actuator."""
+        """Whether the joint carries a moment that varies: gravity's or an actuator's."""
         terms = {*self.data.model.law_parameters, *(term for kind in self.effects for term in kind.law_terms)}
         hangs = any(stiffness in terms for stiffness, _ in WEIGHTS)
         return hangs or any(drive.kind.by_actuator for drive in self.data.inputs)

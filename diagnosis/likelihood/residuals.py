@@ -152,7 +152,7 @@ def wind_line(fit: Fit, least: float, greatest: float, size: str) -> SpectralLin
 
 
 def resonance(fit: Fit, run_index: int) -> float:
-    """Frequency of a run's free motion in the fitted model, Hz; that of `free_frequency` without a spring."""
+    """Frequency of a run's free motion in the fitted model, Hz; without a spring, `free_frequency`."""
     inertia, _, stiffness = linear_coefficients(fit, run_index)
     return fit.problem.data.model.frequency(inertia, stiffness)
 
@@ -197,7 +197,7 @@ class ChannelMisfit:
 
     @property
     def excess(self) -> Array:
-        """χ² beyond that of noise by channel, shape (6,); below 0 by chance."""
+        """χ² beyond noise by channel, shape (6,); below 0 by chance."""
         return np.asarray(self.chi2 - self.count, np.float64)
 
 
@@ -205,7 +205,7 @@ def misfit(fit: Fit, residuals: Sequence[Array] | None = None) -> ChannelMisfit:
     """Misfit of a fit, by channel.
 
     Args:
-        residuals: scaled, by run, each of shape (n,); None: those of the fit.
+        residuals: scaled, by run, each of shape (n,); None: the fit's.
     """
     given = fit.residuals if residuals is None else residuals
     chi2 = [run.channels(left) for run, left in zip(_cycles(fit), given, strict=True)]

@@ -194,7 +194,7 @@ class Between:
 
         Args:
             deviation_precision: Dᵀ D of every run under that model, shape (runs, kinds, kinds).
-            given: the common parameters that are not integrated out, shape (common,): those of effects that the
+            given: common parameters that are not integrated out, shape (common,): parameters of effects that the
                 runs show by themselves, which cannot align runs by chance. None: there are none.
         """
         identity = np.eye(self.widths.size)

@@ -1,7 +1,7 @@
 """Changes of predicted readings to first order, from the derivatives that the compiled integrator carries.
 
-The integrator gives the derivatives of a motion by the terms of its law. What a parameter does to these terms, and
-to the reading of a motion, is cheap to compute: there a small step of the parameter serves.
+The integrator gives the derivatives of a motion by the terms of its law. The effect of a parameter on these terms,
+and on the reading of a motion, is cheap to compute: there a small step of the parameter serves.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _OF_TIMES = (
     "moment_delay",
     "moment_on_end",
 )
-_TOGETHER = 8  # motions in a part of the work: those that the integrator takes side by side
+_TOGETHER = 8  # motions in a part of the work: as many as the integrator takes side by side
 
 
 def changes(asked: Asked, count: int) -> list[Array]:
@@ -91,7 +91,7 @@ def _part(
     Args:
         part: their places.
         moved: changes of their terms, shape (runs, points, terms).
-        sampled: changes of their samples, by run, as of `_samples`.
+        sampled: changes of their samples, by run, as `_samples` returns them.
     """
     count, points = len(asked.runs) // (moved.shape[1] + 1), moved.shape[1]
     columns = np.flatnonzero(moved.any(axis=(0, 1)))

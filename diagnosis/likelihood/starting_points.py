@@ -29,7 +29,7 @@ GROSS_MISFIT: Final = 0.01
 Judgement."""
 
 _HELD = 1e18  # precision of fixed deviations
-_MODERATE, _SMALL = 3.0, 0.05  # sizes of a change, over that of the residual
+_MODERATE, _SMALL = 3.0, 0.05  # sizes of a change, over the residual's size
 _ABSORBED = 2  # steps; after one, the error of the absorption is as large as what remains of the effect
 _NEARER = 0.02  # share of an effect's size by linear theory
 
@@ -317,7 +317,7 @@ def _circumstances(base: Fit) -> Circumstances:
 
 
 def _with_effect(base: Fit, values: Array, scaled: int | None, replaced: int | None) -> Array:
-    """Common parameters with those of an effect; ``replaced`` is the index of the one that it replaces."""
+    """Common parameters with an effect's parameters; ``replaced`` is the index of the one that it replaces."""
     common = base.point.common.copy()
     if scaled is not None and replaced is not None:
         common[replaced] -= values[scaled]
@@ -358,7 +358,7 @@ def _moderate_change(
     """Change of the scaled prediction by an effect, one value lowered until the change is moderate.
 
     ``values`` has the effect's parameters and is changed in place to those used; ``scaled`` is the index of
-    the one to lower, None for none, and ``replaced`` that of the common parameter that it replaces. Where the
+    the one to lower, None for none; ``replaced`` is the common parameter that it replaces. Where the
     runs differ by chance the change is small: the square of a phase error is an amplitude error, which would
     separate an effect from such differences. An effect of ``second_order`` shows by that square alone.
     """

@@ -44,7 +44,7 @@ def prepare(
         noise_variance: of one sample, rad², by run id.
         similarity: how the campaign was made from the measured one.
         interval: between the blocks, s; the nearest number of samples, at least one.
-        model: nominal model of the campaign; None: that of its kind.
+        model: nominal model of the campaign; None: the model of its kind.
         settings: of the diagnosis.
 
     Returns:

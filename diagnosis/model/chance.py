@@ -1,4 +1,4 @@
-"""Chance differences between runs, as a fit has them: what a run's own deviation changes of its motion."""
+"""Chance differences between runs, as a fit has them: the change of a run's motion by its own deviation."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Chance:
         )
 
     def as_wide_as(self, width: float) -> Chance:
-        """The same with another width."""
+        """These differences with another width."""
         return replace(self, width=float(width))
 
     def change(self, stated: SettingsTable, data: Data) -> Array:
@@ -73,7 +73,7 @@ class Chance:
             stated: the nominal physics of the runs.
 
         Returns:
-            Changes of stiffness, N m/rad, and damping, N m s/rad, and that of the wind speed as a share, shape
+            Changes of stiffness, N m/rad, damping, N m s/rad, and wind speed as a share, shape
             (runs, 3).
         """
         pressure, speed = data.air_moments(stated), stated.wind_speed
@@ -119,7 +119,7 @@ def departure(scatter: Sequence[Chance], deviations: Array, stated: SettingsTabl
         stated: the nominal physics of the runs.
 
     Returns:
-        Changes of the stiffness, N m/rad, and of the damping, N m s/rad, and that of the wind speed as a share,
+        Changes of the stiffness, N m/rad, of the damping, N m s/rad, and of the wind speed as a share,
         shape (runs, 3).
     """
     changes = np.stack([one.change(stated, data) for one in scatter])

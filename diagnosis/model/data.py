@@ -25,7 +25,7 @@ class Data(PreparedRuns):
     """A campaign as the fits see it.
 
     Args:
-        model: nominal model of the campaign, whose parameters a part of its runs has, too.
+        model: nominal model of the campaign; a part of its runs has the same parameters.
         similarity: how the campaign was made from the measured one.
         settings: of the diagnosis.
         repeatability: stated relative standard deviations between runs, by what scatters; empty: none is stated.
@@ -50,7 +50,7 @@ class Data(PreparedRuns):
         return kind.acts(wind_on=self.wind_on) and (self.driven or not kind.driven)
 
     def with_runs(self, runs: tuple[RunData, ...]) -> Data:
-        """Other runs of the same campaign, whose model has the same parameters."""
+        """Other runs of the same campaign, with the same parameters."""
         return dataclasses.replace(self, runs=runs)
 
     def with_inputs(self, **change: Any) -> Data:
@@ -58,7 +58,7 @@ class Data(PreparedRuns):
         return self.with_runs(tuple(run.with_input(**change) for run in self.runs))
 
     def undriven(self) -> Data:
-        """The same runs as free decays, whose model has the same parameters."""
+        """The same runs as free decays, with the same parameters."""
         if not self.driven:
             return self
         return self.with_runs(tuple(run.undriven() for run in self.runs))
@@ -68,7 +68,7 @@ class Data(PreparedRuns):
         return self.with_runs(tuple(run for run in self.runs if run.id in keep))
 
     def alone(self, keep: tuple[str, ...]) -> Data:
-        """The runs of the given ids by themselves, whose model has only the parameters that they show."""
+        """The runs of the given ids by themselves, with only the parameters that they show."""
         runs = self.subset(keep).runs
         return dataclasses.replace(self, runs=runs, model=self.model.among(runs))
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from tunnel_sim.engine.joint_model import Recorded
 
 _SAME_GAIN = 1e-3  # relative: within it a stated gain, or a limit, is the model's
-_FEW = 5  # blocks whose readings say how fast a run begins
+_FEW = 5  # number of blocks that give the initial rate of a run
 _OF_SERVO = "These effects of a spring are not tried, because the actuator is a servo: {}."
 _OF_GEAR = (
     "Gravity holds the joint. Play would be in the gears between motor and link, which requires a model of two "
@@ -136,7 +136,7 @@ class _OfLaw(NominalModel):
         return tuple(0.5 * self.law.step * share for share in (0.0, 0.5, 1.0)) if self.law.step else ()
 
     def with_lead(self, lead: float) -> NominalModel:
-        """The same with another lead, s."""
+        """This model with another lead, s."""
         return replace(self, law=replace(self.law, lead=lead))
 
     def notes(self) -> tuple[str, ...]:
@@ -247,7 +247,7 @@ class ServoJoint(Joint):
         return super().spring(values, run) + values["servo_kp"] - self.kp
 
     def settings(self, values: Mapping[str, Array], runs: Sequence[RunData]) -> SettingsTable:
-        """The physics of several runs, whose commands act with the kp, and which hang lower with a smaller one."""
+        """The physics of several runs: commands act with the kp, and with a smaller kp the joint hangs lower."""
         table = super().settings(values, runs)
         for place, kp in enumerate(values["servo_kp"].tolist()):
             drive = table.drive[place]
@@ -272,7 +272,7 @@ class LooseJoint(_OfLaw, LooseBody):
 
     @property
     def held(self) -> Mapping[str, float]:
-        """Without a rest, of which a constant moment takes the place."""
+        """A constant moment replaces the rest angle."""
         return {name: value for name, value in self.law.held.items() if name != "zero"}
 
 

@@ -63,7 +63,7 @@ class LooseBody(NominalModel):
         """Refuse an input of unknown gain.
 
         Raises:
-            TunnelError: for the campaign.
+            TunnelError: when a run has such an input.
         """
         if any(run.input_gain is None for run in campaign.runs):
             raise TunnelError(
@@ -121,7 +121,7 @@ class LooseBody(NominalModel):
         return None
 
     def may_scatter(self, kinds: Sequence[type[Effect]]) -> Sequence[type[BetweenRuns]]:
-        """None: the differences are those of a swing."""
+        """None: the differences are a swing's."""
         del kinds
         return ()
 

@@ -49,8 +49,8 @@ class FitStart:
 class NominalModel:
     """The model of a kind of rig, without any effect.
 
-    A kind overrides what is different for it. All values are those of the similar campaign
-    (`diagnosis.model.similarity`), whose inertia is 1 where it is not known.
+    A kind overrides what differs for it. All values are in the units of the similar campaign
+    (`diagnosis.model.similarity`); its inertia is 1 where unknown.
 
     Args:
         windy: whether the wind is on in any run of the campaign.
@@ -120,7 +120,7 @@ class NominalModel:
         """Refuse runs that it cannot describe.
 
         Raises:
-            TunnelError: for the first of them.
+            TunnelError: names the first of them.
         """
         del campaign
 
@@ -200,7 +200,7 @@ class NominalModel:
         """The physics of one run.
 
         Args:
-            values: of all parameters by name, those of the run and those held among them.
+            values: of all parameters by name, also the run's own and the held ones.
         """
         return self.settings({name: np.array([value]) for name, value in values.items()}, [run]).row(0)
 
@@ -208,7 +208,7 @@ class NominalModel:
         """The physics of several runs.
 
         Args:
-            values: of all parameters by name, those of each run and those held among them, shape (runs,) each.
+            values: of all parameters by name, also each run's own and the held ones, shape (runs,) each.
             runs: the same run may be among them with several values.
         """
         table, names = SettingsTable.empty(len(runs)), tuple(values)
@@ -270,7 +270,7 @@ class NominalModel:
         return ()
 
     def with_lead(self, lead: float) -> NominalModel:
-        """The same with another lead, s."""
+        """This model with another lead, s."""
         del lead
         return self
 
@@ -328,7 +328,7 @@ class NominalModel:
         return stiffness
 
     def critical_damping(self, inertia: float, stiffness: float) -> float | None:
-        """The damping whose ratio is 1, N m s/rad; None where nothing restores the body."""
+        """The critical damping, N m s/rad; None where nothing restores the body."""
         return 2.0 * math.sqrt(inertia * stiffness) if stiffness > 0.0 else None
 
     def may_scatter(self, kinds: Sequence[type[Effect]]) -> Sequence[type[BetweenRuns]]:
@@ -390,14 +390,14 @@ class NominalModel:
         return np.array([float(one == name) for one in names])
 
     def bounded_by(self, names: Sequence[str], name: str) -> str | None:
-        """The parameter at whose bound a coefficient is at a bound, too; None where there is none."""
+        """The fitted parameter whose bound limits this coefficient; None where there is none."""
         del names
         return name if name == "mechanical_damping" else None
 
     # ---- what its runs cannot show, and what to do next ----
 
     def blind_spots(self, data: PreparedRuns) -> tuple[str, ...]:
-        """The limits of these runs, as clauses; those of every campaign are last."""
+        """The limits of these runs, as clauses; limits of every campaign come last."""
         speeds, found = data.wind_speeds, [*self.unseen(data)]
         if not self.windy:
             found += [] if self.of_robot else ["any effect of the air: there is no run with the wind on"]

@@ -47,14 +47,15 @@ class Parameter:
     """One parameter of a fit.
 
     Args:
-        name: that of the nominal model's parameter, or ``effect.parameter``.
-        unit: SI, angles in rad; that of the readings where a parameter has it.
+        name: of the nominal model's parameter, or ``effect.parameter``.
+        unit: SI, angles in rad; the readings' unit where a parameter has it.
         lower: least value allowed, in the unit.
         upper: greatest value allowed, in the unit.
         size: a typical value, below which steps of finite differences shrink no further, in the unit.
-        of_swing: whether its steps are in proportion to the amplitude of the run, whose multiple ``size`` then is.
+        of_swing: whether its steps are in proportion to the amplitude of the run; ``size`` is then a multiple of
+            it.
         effect: name of the effect that it belongs to; empty: the nominal model.
-        prior: of what a run has of its own; None: nothing is known of it, as of a release.
+        prior: on a parameter of a run; None: flat, as for a release.
     """
 
     name: str
@@ -89,12 +90,12 @@ class ParameterSet:
 
     @cached_property
     def common(self) -> tuple[Parameter, ...]:
-        """Those common to the runs."""
+        """The parameters common to the runs."""
         return tuple(one for one in self.parameters if one.owner == "common")
 
     @cached_property
     def own(self) -> tuple[Parameter, ...]:
-        """Those of which every run has its own."""
+        """The parameters of every run."""
         return tuple(one for one in self.parameters if one.owner == "per_run")
 
     @cached_property
@@ -122,14 +123,14 @@ class ParameterSet:
 
     @cached_property
     def of_effects(self) -> int:
-        """How many of a run's own parameters are those of effects; they come last."""
+        """How many of a run's own parameters belong to effects; they come last."""
         return sum(bool(one.effect) for one in self.own)
 
     def places(self, scatter: Sequence[Named]) -> list[int]:
         """Places of a run's deviations among its own parameters.
 
         Args:
-            scatter: what differs between runs.
+            scatter: the parameters that differ between runs.
         """
         return [self.own_names.index(one.name) for one in scatter]
 
@@ -165,7 +166,7 @@ class ParameterSet:
         return float(point.per_run[run, self.own_names.index(name)]) if name in self.own_names else None
 
     def point(self, common: Mapping[str, float], own: Sequence[Mapping[str, float]]) -> Point:
-        """The point of some values; those not given are 0.
+        """The point of some values; the others are 0.
 
         Args:
             common: by name.
@@ -201,7 +202,7 @@ class ParameterSet:
 def released(zero: Parameter | None = None) -> Iterable[Parameter]:
     """The own parameters of every run: its release, and its sensor's zero where each run has one.
 
-    The angle (rad) and the rate (rad/s) are those of the sensor's end at the start of what is fitted.
+    The angle (rad) and the rate (rad/s) belong to the sensor's end, at the start of the fitted part.
     """
     yield Parameter("release_angle", "rad", owner="per_run", of_swing=True)
     yield Parameter("release_rate", "rad/s", size=10.0, owner="per_run", of_swing=True)

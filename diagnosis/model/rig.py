@@ -62,7 +62,7 @@ class SpringModel(NominalModel):
         """Refuse runs that do not state their spring, where such a model is given.
 
         Raises:
-            TunnelError: for all of them.
+            TunnelError: names all of them.
         """
         bare = [run.id for run in campaign.runs if run.spring_stiffness is None]
         if bare:
@@ -129,7 +129,7 @@ class PerInertia(SpringModel):
         """Refuse inputs of known gain beside inputs of unknown gain.
 
         Raises:
-            TunnelError: for the campaign.
+            TunnelError: when there are inputs of both kinds.
         """
         fitted = [drive for drive in campaign.inputs if self.fits_gain(drive)]
         mixed = {drive.gain_stated for drive in fitted}

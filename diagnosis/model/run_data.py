@@ -314,13 +314,13 @@ class RunData:
         return means_of(values, self.block)
 
     def in_blocks(self, means: Array) -> Array:
-        """Block means of the run from its own, or from those of the shorter blocks, shape (..., n)."""
+        """Block means of the run from its own, or from shorter blocks, shape (..., n)."""
         return means if means.shape[-1] == self.reading.size else means_of(means, self.merges)
 
     def part(self, first: int = 0, last: int | None = None) -> RunData:
         """The run from one block up to, and without, another; None: to the end.
 
-        Its duration is that of the record less what is left out at the start.
+        Its duration is the record's, less the part left out at the start.
         """
         last = self.reading.size if last is None else last
         return dataclasses.replace(
@@ -413,11 +413,11 @@ class PreparedRuns(RunGroups[RunData]):
         )
 
     def air_damping(self, run: RunData) -> float:
-        """The same for a rate coefficient of 1, ½ρVAl², N m s; 0 with the wind off."""
+        """Damping by the air for a rate coefficient of 1, ½ρVAl², N m s; 0 with the wind off."""
         return self.air_moment(run) * self.reference_length / run.wind_speed if run.wind_on else 0.0
 
     def air_moments(self, runs: SettingsTable) -> Array:
-        """The same of several runs, N m, shape (runs,)."""
+        """The air's yaw moment for a moment coefficient of 1 in several runs, N m, shape (runs,)."""
         return aerodynamic_stiffness(
             1.0, air_density=runs.air_density, wind_speed=runs.wind_speed, **self._sizes
         )

@@ -121,7 +121,7 @@ class AutoregressiveNoise(RunNoise):
         return errors
 
     def coloured(self, values: Array) -> Array:
-        """The values of which `white` makes these errors."""
+        """The inverse of `white`: the values behind these errors."""
         from scipy.signal import lfilter, lfiltic  # only here: slow to load
 
         start = _start(self.whitening.tobytes())[: values.size, : values.size]
@@ -145,7 +145,7 @@ class NoiseWithMoment(RunNoise):
 
     Args:
         variance: of what both filters leave, rad².
-        sensor: the noise beside the response, whose own variance does not matter.
+        sensor: the noise beside the response; its variance does not matter.
         numerator: of the filter that makes both white after the sensor's noise alone is white, shape (m,).
         denominator: of that filter, shape (k,).
     """
@@ -169,12 +169,12 @@ class NoiseWithMoment(RunNoise):
         return self.sensor.coloured(_filtered(self.denominator, self.numerator, values))
 
     def response(self, cycles: Array) -> np.ndarray:
-        """Those of both filters, multiplied."""
+        """The factors of both filters, multiplied."""
         own = self.sensor.response(cycles) * _response(self.numerator, cycles)
         return np.asarray(own / _response(self.denominator, cycles))
 
     def taps(self, count: int) -> Array:
-        """Those of both filters, one after the other, shape (count,)."""
+        """The responses of both filters, one after the other, shape (count,)."""
         sensor, impulse = self.sensor.taps(count)[:count], np.zeros(count)
         impulse[: sensor.size] = sensor
         return _filtered(self.numerator, self.denominator, impulse)
@@ -219,7 +219,7 @@ def _start(whitening: bytes) -> Array:
     predictor = np.frombuffer(whitening)
     order = predictor.size - 1
     rows = np.zeros((order, order))
-    variance = 1.0  # of the prediction error, in that of the whole filter
+    variance = 1.0  # of the prediction error, over the whole filter's
     for m in range(order, 0, -1):
         reflection = predictor[-1]
         left = 1.0 - reflection**2

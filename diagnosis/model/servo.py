@@ -127,7 +127,7 @@ class Servo(_OfServo, SpringModel):
         return replace(self, kv=change.similar(self.kv, "N m s/rad"))
 
     def starts(self, data: PreparedRuns) -> Iterator[FitStart]:
-        """Inertia and damping by the response to the command, whose gain is the kp; then as a rig."""
+        """Inertia and damping by the response to the command (its gain is the kp); then as a rig."""
         shown = [
             (run.spring_stiffness / response.stiffness, 2.0 * response.rate)
             for run in data.runs

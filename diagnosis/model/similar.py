@@ -18,7 +18,7 @@ def similar_campaign(campaign: Campaign, model: NominalModel | None = None) -> t
     """The campaign of the similar rig.
 
     Args:
-        model: its nominal model; None: that of its kind.
+        model: its nominal model; None: the model of its kind.
 
     Returns:
         The similar campaign, and how it was made. Its wind-off runs have a median frequency of
@@ -61,7 +61,7 @@ def similar_campaign(campaign: Campaign, model: NominalModel | None = None) -> t
 
 
 def _drive(drive: Input, change: Similarity) -> Input:
-    """An input, whose own times are those of its record."""
+    """An input at the times of its record."""
     if drive.kind.takes_gain:  # the values stay as they are
         return dataclasses.replace(drive, gain=None if drive.gain is None else drive.gain * change.moment)
     return dataclasses.replace(drive, values=drive.values * change.similar(1.0, drive.kind.unit))

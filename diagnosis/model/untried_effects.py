@@ -17,10 +17,10 @@ def untried_by_inputs(campaign: Campaign, kinds: Sequence[type[Effect]]) -> dict
     """The effects whose moment does not follow from an input, by the sentence that says why.
 
     Args:
-        kinds: those that are to be tried.
+        kinds: effects to try.
 
     Returns:
-        By a sentence with a place for their names, those of ``kinds`` that are not tried; none where all follow.
+        By a sentence with a place for their names, the untried members of ``kinds``; none where all follow.
     """
     inputs = {drive.kind for drive in campaign.inputs}
     found: dict[str, list[type[Effect]]] = {}

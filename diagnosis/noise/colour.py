@@ -6,7 +6,7 @@ therefore taken between the harmonics, in parts of all records, where these part
 wind or the amplitude, and lies at the harmonics, across which the spectrum is interpolated.
 
 Coloured noise and a wandering zero both raise the spectrum towards low frequencies. The spectrum of noise is level
-below some corner; that of a random walk is not, because its zero departs ever further.
+below some corner; a random walk's is not, because its zero departs ever further.
 """
 
 from __future__ import annotations
@@ -152,7 +152,7 @@ def noise_colour(nominal: Fit, beyond: float = 0.0, *, throughout: bool = False)
 
 
 def _red(slope: float) -> float:
-    """A slope between that of white noise and that of a random walk."""
+    """A slope between white noise and a random walk."""
     return float(np.clip(slope, -2.0, 0.0))
 
 
@@ -187,13 +187,13 @@ def whitened(data: Data, colour: Colour) -> Data:
 
 _LOWEST_CORNER = 1e-3  # of the colour's lowest frequency: effectively none
 _CORNERS = (1.0, 4.0, 16.0)  # of the colour's lowest frequency, to start from
-_WHITE = 30.0  # the level's natural logarithm stays within this of that of white noise
+_WHITE = 30.0  # the level's natural logarithm stays within this distance of white noise
 
 
 def zero_wanders(nominal: Fit, colour: Colour) -> bool:
     """Whether the noise's spectrum rises to the lowest frequencies of the runs without a corner.
 
-    The decision is a likelihood ratio. The spectrum is that of white noise and a first-order process, which is a
+    The decision is a likelihood ratio. The spectrum adds white noise and a first-order process, which is a
     random walk where its corner is zero; the colour's lowest band is the lowest visible corner of stationary noise.
     It is fitted to the ordinates between the harmonics by Whittle's likelihood (P. Whittle, Ark. Mat. 2 (1953) 423,
     doi 10.1007/BF02590998).

@@ -30,7 +30,7 @@ NOISE_TOLERANCE: Final = 0.03
 """Allowed excess of the noise below 60 Hz over the noise above 60 Hz, as a share. Judgement. Quantisation
 colours the noise."""
 NOISE_TAILS: Final = 1.15
-"""Allowed ratio of the tails of the noise to those of a normal distribution. Judgement. Sensor noise is not
+"""Allowed ratio of the tails of the noise to a normal distribution's tails. Judgement. Sensor noise is not
 exactly normal."""
 NOISE_ABOVE_STATED: Final = 1.5
 """Maximum ratio of the noise variance to the stated variance that does not count as a gap. Judgement. Stated
@@ -78,7 +78,7 @@ def trend_p_values(trend: NoiseTrend, fit: Fit, noise: Noise) -> Mapping[str, fl
 def level_p_value(fit: Fit, noise: Noise) -> float:
     """P-value of the estimated noise level if the stated noise, with its rounding, is right.
 
-    It is that of a sign test: that at least half the ordinates of the periodogram above the motion exceed the
+    It comes from a sign test: that at least half the ordinates of the periodogram above the motion exceed the
     median found, at the largest noise that the statement allows.
     """
     assert noise.stated_variance is not None
@@ -97,7 +97,7 @@ class GapTest:
     Args:
         p_value: the smallest p-value, times the number of tests (at most 1).
         tests: p-value by name: the bands, the noise's trend with the motion, its scatter and its level, and
-            differences between runs beyond those in the fit.
+            differences between runs beyond the fitted ones.
         noisy: whether the noise itself misbehaves: its level follows the motion, it comes in bursts, or it is
             above the stated level.
         within_step: whether the gap is no larger than the error of the readings' lattice, and therefore not a gap;
@@ -233,7 +233,7 @@ class _Candidate:
 def _candidates(nominal: Fit, noise: Noise) -> Iterator[_Candidate]:
     """The possible colours of the noise; none where the nominal model misses the motion.
 
-    The first is that of all runs. The input excites a narrow line, and colour is sought beside it. Turbulence may
+    The first comes from all runs. The input excites a narrow line, and colour is sought beside it. Turbulence may
     hide the colour, which is then sought in the runs with the wind off alone.
     """
     if misses_motion(nominal):

@@ -112,7 +112,7 @@ def refine_frequency(campaign: Campaign, frequency: float, motion: float = REFER
 
     Args:
         frequency: of the mains, Hz, to within a quarter of a line's width.
-        motion: frequency of the fastest motion, Hz, beyond whose harmonics a line is sought.
+        motion: frequency of the fastest motion, Hz; a line is sought beyond its harmonics.
     """
     shown = _showing(campaign, frequency, motion)
     cleared = [_without_motion(r, np.hanning(r.time_s.size))[1] for r, multiples in shown if multiples]
@@ -146,10 +146,10 @@ def remove_hum(
     Args:
         frequency: of the fundamental, Hz, visible in one record or more.
         variance: of the noise of one sample, rad².
-        motion: frequency of the fastest motion, Hz, beyond whose harmonics a line is removed.
+        motion: frequency of the fastest motion, Hz; a line is removed beyond its harmonics.
 
     Returns:
-        The campaign without it, and the hum that was removed. The standard deviation of its frequency is that of
+        The campaign without it, and the hum that was removed. The standard deviation of its frequency is the one of
         the peak of all records' windowed spectra under white noise, for the strongest line only. For one record
         with window w the variance of ω is 2 S² Σw²τ²/(a Σwτ²)², τ from its middle: with a flat window that is the
         bound 24 S²/(a² n T²) (Rife & Boorstyn, IEEE Trans. Inf. Theory 20 (1974) 591, doi

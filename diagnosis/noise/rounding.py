@@ -119,7 +119,7 @@ class Rounded(Rounding):
         return np.maximum(level, 1.0), np.sqrt(np.maximum(beyond, 0.0))
 
     def allowed_in(self, data: Data) -> Data:
-        """Raised where averaging reduces the errors less than white noise, at most to that of one sample.
+        """Raised where averaging reduces the errors less than white noise, at most to the error of one sample.
 
         The same data where none is raised.
         """

@@ -287,7 +287,7 @@ def reading_levels(campaign: Campaign) -> Array:
 
 
 def typical_step(levels: Array) -> float:
-    """The step of equal width whose rounding has the power of `reading_levels`, two or more, rad."""
+    """The uniform step with the same rounding power as `reading_levels`, two or more, rad."""
     widths = np.diff(levels)
     return float(np.sqrt(np.sum(widths**3) / np.sum(widths)))
 
@@ -311,7 +311,7 @@ class NoiseTrend:
         amplitude_z: slope of the local noise variance against the squared amplitude, in units of its standard
             deviation under steady white noise.
         rate_z: slope of the local noise variance against the squared rate, in its own standard deviation, a ratio.
-        spread: natural logarithm of the ratio of the local variances' standard deviation to that of a normal
+        spread: natural logarithm of the ratio of the local variances' standard deviation to its value for a normal
             distribution with their quartiles: positive for heavy tails. Skewness alone makes it about 0.1.
         step: of the lattice of the readings, rad.
         judged: whether any run is sampled fast enough for the test.

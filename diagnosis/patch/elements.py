@@ -86,7 +86,7 @@ class Inertia(NativeElement):
             return written
         share = (self.inertia - rotors) / (law.inertia - float(before.dof_armature[0]) - rotors)
         if not share > 0.0:
-            what = f"the inertia found, {self.inertia:.4g} kg m2, is less than that of the actuators' rotors"
+            what = f"the inertia found, {self.inertia:.4g} kg m2, is less than the rotors' inertia of the actuators"
             raise TunnelError(what, remedy="correct the armature of the actuators")
         data = mujoco.MjData(before)
         mujoco.mj_forward(before, data)
@@ -110,7 +110,7 @@ class Inertia(NativeElement):
 
 @dataclass(frozen=True)
 class Spring(NativeElement):
-    """A restoring moment beside that of the model.
+    """A restoring moment beside the model's.
 
     Args:
         added: coefficients of 1, b, b² and b³ of the displacement b from rest, N m, N m/rad, N m/rad² and N m/rad³.
@@ -169,7 +169,7 @@ class Spring(NativeElement):
 
 @dataclass(frozen=True)
 class Damper(NativeElement):
-    """Damping beside that of the joint.
+    """Damping beside the joint's.
 
     Args:
         added: coefficients of ḃ, |ḃ|ḃ and ḃ³, N m s/rad, N m s²/rad² and N m s³/rad³.
@@ -218,7 +218,7 @@ class DryFriction(NativeElement):
         return cls(law.own(moments.loss, "N m"), law.own(moments.presliding, "rad"), tuple(numerics.items()))
 
     def write(self, into: Into) -> Into:
-        """Friction as ``frictionloss``, with presliding as that of a motor without a control, or as the plugin's.
+        """Friction as ``frictionloss``, with presliding as a motor without a control has it, or as the plugin's.
 
         MuJoCo has LuGre's friction in motors alone. Without a damping of its own and a rise near rest it is Dahl's.
         The deflection has a lower limit, so that the oscillation of the contact is stable with the model's steps.

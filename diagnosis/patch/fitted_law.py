@@ -73,7 +73,7 @@ class FittedLaw:
 
     @cached_property
     def moments(self) -> NativeMoments:
-        """The moments beside those of the given model, in the units of the similar campaign."""
+        """The moments beside the given model's, in the units of the similar campaign."""
         problem, physics, law = self.problem, self.physics, self.law
         data, model, fitted = problem.data, problem.data.model, self.fitted
         zero = problem.zero(self.common, self.release)

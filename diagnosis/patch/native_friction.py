@@ -67,7 +67,7 @@ def native_friction(
 ) -> NativeMoments:
     """The friction of a moment law in the elements of MuJoCo.
 
-    Presliding friction is that of a ``dcmotor`` without a control (``lugre``), which is Dahl's where it has no
+    Presliding friction becomes a ``dcmotor`` without a control (``lugre``), which is Dahl's where it has no
     damping of its own. Friction that depends on the rate becomes ``frictionloss`` and the joint's polynomial
     damping where their error is within the allowance. All other friction is the plugin's own. Without the plugin,
     friction that depends on the load has its mean.
@@ -76,7 +76,7 @@ def native_friction(
         parameters: of the moment law, by name.
         rates: positive rates in the runs, rad/s, shape (n,).
         law: of the joint as the model has it.
-        damping: to be written in addition to that of the joint, N m s/rad.
+        damping: to add to the joint's, N m s/rad.
         may_miss: greatest error of a polynomial, as a share of the greatest friction; infinite: no plugin.
         carried: in the runs, by friction that depends on the load.
     """

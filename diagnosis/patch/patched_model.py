@@ -148,7 +148,7 @@ def _restarted(
         return engine_residual(problem, common, per_run, index, simulate, native)
 
     best = left(own)
-    # derivatives of the engine: its frequency may depend on the amplitude where that of the fit does not
+    # derivatives of the engine: its frequency may depend on the amplitude where the fit's does not
     if slopes is None:
         steps = _SHIFT * max(abs(float(own[0])), 1e-3) * np.array([1.0, 10.0])
         moved = [(best - left(own + step * np.eye(own.size)[k])) / step for k, step in enumerate(steps)]
@@ -294,7 +294,7 @@ def _written_model(
     if given is not None and given.opt.integrator != int(mujoco.mjtIntegrator.mjINT_RK4):
         differences += (Fact("early steps", {"half_step_ms": 500.0 * given.opt.timestep}),)
     own = list(chosen.point.per_run)
-    if given is not None:  # the engine's steps and its input do not begin as those of the fit
+    if given is not None:  # the engine's steps and its input do not begin as in the fit
         common = chosen.point.common
         for i, one in enumerate(own):
             held, slopes = restarts.get(i), None

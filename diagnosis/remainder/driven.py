@@ -22,7 +22,7 @@ from diagnosis.remainder.laws import held_out_share, stated_law
 from diagnosis.search.study import Study
 
 LAWS_FITTED: Final = 3
-"""Number of laws that are fitted to driven runs, those of greatest predicted drop of χ² first. Judgement.
+"""Number of laws that are fitted to driven runs, by greatest predicted drop of χ². Judgement.
 Time against coverage."""
 
 _OF_RATE = ("abs(r)*r", "r^3", "sign(r)")

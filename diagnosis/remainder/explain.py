@@ -351,7 +351,7 @@ def steady_line(unexplained: Unexplained) -> SteadyLine | None:
 
 
 def _strongest(unexplained: Unexplained) -> tuple[float | None, float]:
-    """Frequency of the least likely line, Hz, and the power beside it over that of the noise."""
+    """Frequency of the least likely line, Hz, and the power beside it over the noise's."""
     from scipy.ndimage import median_filter  # only here: slow to load
 
     spectra = smooth_spectra(unexplained.fit)
@@ -360,7 +360,7 @@ def _strongest(unexplained: Unexplained) -> tuple[float | None, float]:
     grid = longest.frequency[(longest.frequency > 0.0) & (longest.frequency < top)]
     power, count, floors = np.zeros(grid.size), np.zeros(grid.size), np.zeros(grid.size)
     for index, spectrum in enumerate(spectra):
-        # the floor is the median power around each frequency over that of white noise, at least 1
+        # the floor is the median power around each frequency over white noise's, at least 1
         step = max(1, round(1.0 / (spectrum.duration * spectrum.frequency[1])))  # the padding
         frequency = spectrum.frequency[::step]
         around = median_filter(spectrum.power(frequency), _AROUND, mode="nearest")

@@ -102,7 +102,7 @@ def disturbances(measured: Campaign, nominal: Fit) -> tuple[Disturbance, ...]:
         return float(clocks[name]) + similarity.own(data.runs[index[name]].start + time, "s")
 
     def kept_from(name: str, time: float) -> float | None:
-        """That clock, where enough of the run follows to be used; else None."""
+        """The clock at that instant, where enough of the run follows; else None."""
         run, frequency = data.runs[index[name]], resonance(nominal, index[name])
         span = run.reading.size * run.interval
         follows = (span - time) * frequency >= DISTURBED_KEPT and time < _EARLY * span

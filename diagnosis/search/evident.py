@@ -1,4 +1,4 @@
-"""Which effects are evident beside a random moment: those that lower χ² far beyond what chance multiplies it by."""
+"""Which effects are evident beside a random moment: they lower χ² far beyond its overdispersion."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def needed(top: Hypothesis) -> Hypothesis:
 
 
 def overdispersion(fitted: Fit, kind: type[Effect]) -> float:
-    """Variance of an effect's parameters over that of independent noise, 1 or more.
+    """Variance of an effect's parameters over its value in independent noise, 1 or more.
 
     Returns:
         From the scatter of the runs' gradients, whose sum is zero (the sandwich covariance with the runs

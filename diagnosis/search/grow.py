@@ -29,7 +29,7 @@ def grow(
 
     Args:
         progress: called with the names of each set that is tried.
-        enough: whether larger sets than those of a level are not needed; None: they are.
+        enough: whether sets larger than a level's are needless; None: never.
 
     Returns:
         Fitted hypotheses of all sizes, best first. Growth ends where the evidence for a larger set falls or cannot
@@ -90,7 +90,7 @@ def _may_gain(hypothesis: Hypothesis, scale: Scale) -> bool:
 
 
 def _likeliest(children: Sequence[Hypothesis], gap: ChannelMisfit, view: RunsInView) -> list[Hypothesis]:
-    """The sets, the best of which are also fitted to runs that repeat exactly."""
+    """The sets; the best are also fitted to runs that repeat exactly."""
     if not view.base.problem.scatter:
         return list(children)
     scale = Scale.of((*children, view.smallest), gap, view.base.settings.weighing)

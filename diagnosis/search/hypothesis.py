@@ -110,7 +110,7 @@ class Hypothesis:
     def excess(self) -> Array:
         """χ² beyond noise of the set, by channel, shape (6,), dimensionless.
 
-        The chance gain of instants is added in the frequency, and that of phases in the harmonics.
+        The chance gain of instants is added in the frequency, the chance gain of phases in the harmonics.
         """
         problem = self.fit.problem
         found, gain = misfit(self.fit).excess, self.fit.settings.weighing.own_number_gain
@@ -139,7 +139,7 @@ class Hypothesis:
         """The set as input of the weighing, with the chance gain of instants and phases added to its misfit.
 
         Args:
-            nominal: the nominal fit, whose gap shares refer to.
+            nominal: the nominal fit; shares refer to its gap.
             gap: the misfit that the set is weighed against.
             outside: as in `FittedSet`.
         """
@@ -271,7 +271,7 @@ def turned_back(fitted: Fit) -> Fit:
 
 
 def restricted(whole: Fit, names: Collection[str]) -> Fit:
-    """A fit with some effects only, by name; the rest, and its residuals, are those of the whole.
+    """A fit with some effects only, by name; all else, with the residuals, is the whole fit's.
 
     Returns:
         A start, with its sensitivities, for the fit of the smaller problem.
@@ -308,7 +308,7 @@ def with_forms(
     Args:
         gap: misfit of the nominal model.
         least: excess of a textbook form from which freeing it is tried, dimensionless (noise variances).
-        count: number of the best that are tried with free forms, beside those that may act under load.
+        count: number of the best that are tried with free forms, beside effects that may act under load.
 
     Returns:
         All hypotheses, best first.
@@ -352,7 +352,7 @@ def _choices(fitted: Fit) -> Iterator[tuple[Form, ...]]:
 
 
 def _within(part: Sequence[Form], forms: Sequence[Form]) -> bool:
-    """Whether the form of every effect has that of another choice within it."""
+    """Whether the form of every effect contains the other choice's form."""
     return all(set(one) <= set(other) for one, other in zip(part, forms, strict=True))
 
 

@@ -44,7 +44,7 @@ def investigate(
         campaign: in its own units.
         kinds: the effects that may be named.
         progress: called with the name of each step.
-        model: the nominal model of the campaign, in the same units; None: that of its kind.
+        model: the nominal model of the campaign, in the same units; None: the model of its kind.
         settings: of the diagnosis.
         rivals: from outside the vocabulary, weighed beside the effects.
         views: in which sets of effects are found, in order of preference.
@@ -85,7 +85,7 @@ def investigate(
 def without_odd_runs(
     found: Study, campaign: Campaign, model: NominalModel, study: Callable[[Campaign, NominalModel], Study]
 ) -> Study:
-    """The study of the runs without those that differ from the others as a whole.
+    """The study of the runs, without runs that differ from the others as a whole.
 
     Args:
         found: the study of all runs.

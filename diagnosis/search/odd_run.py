@@ -95,7 +95,7 @@ def odd_runs(measured: Campaign, study: Study) -> tuple[Disturbance, ...]:
 
     Returns:
         The likeliest, at one rate of false alarms. Driven runs are not among them, nor is a run that alone has its
-        wind state or its spring: its difference may be that of its conditions.
+        wind state or its spring: its difference may come from its conditions.
     """
     nominal, answer = study.nominal, study.answer
     if not study.gap.test.detected:
@@ -295,7 +295,7 @@ def _weight(one: Hypothesis, scale: Scale) -> float:
 
 
 def replaceable(data: Data) -> list[int]:
-    """Indices of the runs of which others have the wind state, and others the spring."""
+    """Indices of the runs that share the wind state with other runs, and the spring with other runs."""
     found = []
     for index, run in enumerate(data.runs):
         others = [other for other in data.runs if other is not run]
@@ -335,7 +335,7 @@ def _expected(data: Data, noisy: Data) -> float:
 
 
 def _without_a_run(sets: Sequence[Hypothesis]) -> Iterator[OddRuns]:
-    """The sets without the runs that they explain least: those of least misfit, or of fewest effects if by chance.
+    """The sets without the runs that they explain least: least misfit first, or fewest effects if equal by chance.
 
     Without such a run most of a set's misfit vanishes, by linear theory. The nominal model, the first of the sets,
     is fitted without each run without which a set is fitted.

@@ -72,8 +72,8 @@ class Prepared:
         cut: whether the start of every run and the time after its motion were left out, because the nominal model
             misses the motion grossly.
         rested: runs that end with a long rest, which the fits leave out.
-        tested: the nominal fit in the blocks in which noise and gap were tested, where those of ``nominal`` are
-            wider.
+        tested: the nominal fit in the blocks in which noise and gap were tested, where the blocks of ``nominal``
+            are wider.
         uncut: the nominal fit to whole runs, where these were cut.
     """
 

@@ -139,7 +139,7 @@ def random_moments(fit: Fit, source: MomentSource) -> list[ProcessNoise]:
 def _pays_in_all_runs(both: ProcessNoise, first: ProcessNoise, chosen: RandomMomentSettings) -> bool:
     """Whether a second part lowers −2 ln L by more than chance, for any selection of runs.
 
-    It acts in all runs, while a model error acts in those of one spring or speed. The scatter between the runs
+    It acts in all runs, while a model error acts in the runs of one spring or speed. The scatter between the runs
     shows how much of the drop may be chance.
     """
     alone = dict(zip(first.runs, first.drops.tolist(), strict=True))

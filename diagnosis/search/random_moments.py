@@ -127,7 +127,7 @@ class _Beside:
     """A random moment of a source, and the best set of effects beside it.
 
     Args:
-        alike: the likeliest, and those of other kinds that explain the runs nearly as well.
+        alike: the likeliest, and other kinds that explain the runs nearly as well.
         sets: the set with the response to the random moment in the noise, and its rivals with another effect in
             place of one.
         seen: the first of them with the sensor's noise alone.
@@ -174,7 +174,7 @@ class _Beside:
         return _cost(self.alike[0], self.sets[0])
 
     def answers(self) -> list[RandomAnswer]:
-        """The answers to be weighed, the likeliest first; without those a part of which may not be named."""
+        """The answers to be weighed, the likeliest first; without answers that contain an unnameable part."""
         tried = (self._answer(process, top) for process in self.alike for top in self.sets)
         return [answer for answer in tried if answer is not None]
 
@@ -392,7 +392,7 @@ def _exchanged(
     """The sets with another effect in place of one, in the noise of the given set.
 
     Args:
-        exchanges: names of an effect and of the one to take its place; those that do not apply are passed over.
+        exchanges: names of an effect and of the one to take its place; exchanges that do not apply are passed over.
     """
     found = []
     for out, into in sorted(exchanges):
@@ -450,7 +450,7 @@ def _settled(
 
 
 def _sought_again(hypothesis: Hypothesis) -> Hypothesis:
-    """The set with instants and phases sought once more; each run keeps those of least residual.
+    """The set with instants and phases sought once more; each run keeps the ones of least residual.
 
     They were first found before the other effects were known.
     """

@@ -1,7 +1,7 @@
 """Spectra of random moments: where a moment comes from, its parts, and the forms of a part that are tried.
 
-The stream's moment is in proportion to its pressure and acts with the wind on; that of the surroundings is the same
-in every run. The runs with the wind off distinguish them, and so do several wind speeds.
+The stream's moment is in proportion to its pressure and acts with the wind on; the moment of the surroundings is
+the same in every run. The runs with the wind off distinguish them, and so do several wind speeds.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ class MomentSource(ABC):
     - ``condition``: of the effects that are such a moment.
     - ``in_every_run``: whether it acts in every run, as noise of the reading and a steady line do, which could be
       mistaken for it.
-    - ``laws``: kinds of law, of `diagnosis.likelihood.paths.COMMON`, that could be mistaken for it: those that act
-      in the same runs.
+    - ``laws``: kinds of law, of `diagnosis.likelihood.paths.COMMON`, that could be mistaken for it: the kinds that
+      act in the same runs.
     """
 
     condition: ClassVar[Condition]
@@ -183,7 +183,7 @@ def wandering(data: Data) -> SpectrumForm | None:
 
 
 def of_surroundings(unit: float) -> tuple[SpectrumForm, SpectrumForm]:
-    """A moment of the surroundings without and with a centre, as `BROAD` and `CENTRED` are those of the stream.
+    """A moment of the surroundings without and with a centre; `BROAD` and `CENTRED` are the stream's.
 
     Args:
         unit: the moment whose response is as large as the noise, N m.

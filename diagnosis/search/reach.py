@@ -20,7 +20,7 @@ from tunnel_sim.effects.capabilities import OwnNumbers
 from tunnel_sim.vocabulary.record import Array
 
 _NULL = 1e-9  # singular value, relative to the largest, that counts as zero
-_RANK = 1e-6  # the same for the columns of all effects, which are finite differences
+_RANK = 1e-6  # for the columns of all effects, which are finite differences
 
 
 def unexplained_floor(

@@ -60,7 +60,7 @@ def _halves(whole: Fit) -> Iterator[tuple[Array, Array]]:
     for early in (True, False):
         seen = [(np.arange(r.size) < r.size // 2) == early for r in whole.residuals]
         fitted = whole
-        for _ in range(_ROUNDS):  # the sensitivities of the whole may differ much from those of the half
+        for _ in range(_ROUNDS):  # the sensitivities of the whole may differ much from the half's
             before = fitted.point.common
             fitted = fit_at(problem, fit_seen(fitted, seen, held=forms)[0])
             stds = _stds(fitted, seen, forms)

@@ -72,7 +72,7 @@ class RunsInView:
         return Hypothesis((), self.base)
 
     def larger(self, level: Sequence[Hypothesis], progress: Progress | None) -> list[Hypothesis]:
-        """The sets with one effect more than those of a level."""
+        """The sets with one effect more than a level's sets."""
         return sets_with_one_more(level, self.able, progress)
 
     def with_forms(self, children: Sequence[Hypothesis], level: Sequence[Hypothesis]) -> Sequence[Hypothesis]:
@@ -94,7 +94,7 @@ class RunsInView:
         """
         del level
         kept: list[Hypothesis] = []
-        for hypothesis in going:  # those that change the readings alike would grow alike
+        for hypothesis in going:  # sets that change the readings alike would grow alike
             if not any(same_change(hypothesis.fit, other.fit, self.base) for other in kept):
                 kept.append(hypothesis)
         return kept[: self.base.settings.search.grown_from]

@@ -227,7 +227,7 @@ def drifts(fitted: Fit, place: int) -> bool:
     """Whether the runs differ in one number in proportion to their place, and in no other.
 
     Args:
-        place: of the number among those that differ in the fit.
+        place: of the number among the numbers that differ in the fit.
     """
     columns, prior, chosen = fitted.columns, width_prior(fitted.problem), fitted.settings.scatter
     beside, _ = columns.with_drift(place)

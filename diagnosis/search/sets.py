@@ -185,7 +185,7 @@ def _with_near_sets(sets: Sets, clock: StepClock) -> Sets:
             sets = replace(sets, hypotheses=(*known, *exchange(best, known, view.base)))
     if not pruned:
         return sets
-    with clock.step("forms"):  # of rival sets, freed where that pays: growth frees those of few sets
+    with clock.step("forms"):  # of rival sets, freed where that pays: growth frees the forms of few sets
         near = [w.effects for w in sets.weighed if w.effects != UNKNOWN and w.probability > RIVAL_FORMS]
         if len(near) < 2:
             return sets
@@ -237,7 +237,7 @@ def prune(whole: Hypothesis, found: Sequence[Hypothesis]) -> list[Hypothesis]:
 
 
 def _total(start: Fit) -> float:
-    """The χ² at the point of a fit, whose residuals are those of another problem."""
+    """The χ² at the point of a fit, with the residuals of another problem."""
     left = scaled_residuals(start.problem, start.point)
     return sum(float(r @ r) for r in left) + start.problem.parameters.surprise(start.point)
 
@@ -247,7 +247,7 @@ def exchange(whole: Hypothesis, found: Sequence[Hypothesis], nominal: Fit) -> li
 
     Args:
         whole: with two effects or more.
-        found: fitted hypotheses, those with one effect less than ``whole`` among them.
+        found: fitted hypotheses, among them all with one effect less than ``whole``.
 
     Returns:
         Those that are not fitted yet. Two effects are alike where the fits of each alone are.

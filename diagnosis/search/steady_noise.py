@@ -34,7 +34,7 @@ _LINE_WIDTHS = 3.0  # about the centre of a spectrum in which a line is sought
 
 
 def is_steady_noise(result: ProcessNoise, chosen: RandomMomentSettings) -> bool:
-    """Whether innovations are white and steady, without bursts, and not those of one run."""
+    """Whether innovations are white and steady, without bursts, and not of one run alone."""
     return (
         departure_from_white(result) <= WHITE_INNOVATIONS
         and bursts(result, chosen.burst_rate) <= BURST_POWER
@@ -83,8 +83,8 @@ def of_all_runs(result: ProcessNoise) -> float:
     """P-value that one run has as much of a random moment as this one does, if it acts in all runs.
 
     A gust in one run is not turbulence. The power of the response to the narrowest random moment, which has two
-    quadratures, is an exponential variable, and that of a broader one varies less. Fisher's test of the greatest of
-    n such variables: Proc. R. Soc. A 125 (1929) 54, doi 10.1098/rspa.1929.0151.
+    quadratures, is an exponential variable; the power of a broader one varies less. Fisher's test of the greatest
+    of n such variables: Proc. R. Soc. A 125 (1929) 54, doi 10.1098/rspa.1929.0151.
 
     Returns:
         The first term of Fisher's series, which is at least the probability; a fraction.

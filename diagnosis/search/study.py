@@ -167,7 +167,8 @@ class Study:
     def named_beside(self, answer: Answer) -> Names:
         """Causes other than the fitted effects of an answer: detected in the records, or differences between runs.
 
-        The differences are its own. An answer that was fitted to runs that repeat has those of the first answer.
+        The differences are its own. An answer that was fitted to runs that repeat has the differences of the first
+        answer.
         """
         fit = None if answer is self.answer else answer.fit
         if fit is None or not fit.problem.scatter:
@@ -199,7 +200,7 @@ class Study:
 
     @property
     def stated(self) -> Fit:
-        """The fit whose coefficients are stated: that of the answer, in the noise in which it is stated."""
+        """The fit that supplies the reported coefficients."""
         answer = self.answer
         if answer is None or answer.stated is None or answer.stated is answer.hypothesis:
             return self.chosen
@@ -216,7 +217,7 @@ class Study:
         return next((answer for answer in self.answers if answer.effects == key), None)
 
     def of_part(self, names: Names) -> Study:
-        """The study without its answer and the sets that contain it, whose answer is a part of it.
+        """The study without its answer and the sets that contain it; the new answer is a part of the old one.
 
         The others keep their odds. ``unknown`` is the answer where it is more probable than all sets together, or
         the part was not weighed.
@@ -242,7 +243,7 @@ class Study:
         """The study whose answers are sets; the first of them and its parts are fitted to whole runs.
 
         Args:
-            sets: those of the last view.
+            sets: of the last view.
         """
         prepared = sets.view.prepared
         with clock.step("polishing"):

@@ -26,7 +26,7 @@ EXPLAINS_MOST: Final = 1.5
 leaves in its runs. Judgement. The release of a run absorbs part of a random motion, and the nominal model all
 that it can; a half is allowed for both."""
 EXPLAINS_ALONE: Final = 3.0
-"""The same for a random moment without effects beside it. Judgement. The nominal model and the releases may
+"""This limit for a random moment without effects beside it. Judgement. The nominal model and the releases may
 absorb two thirds of a random motion of few cycles. In two campaigns where a moment acts alone the drop is
 1.54 and 1.61; no campaign shows where the limit fails."""
 EXPLAINS_STDS: Final = 4.0
@@ -126,8 +126,8 @@ def _without_each(whole: Fit) -> Iterator[tuple[str, str, Array, Array]]:
     """By effect whose severity is fitted and evident, its size without each run, and the evidence for that size.
 
     Returns:
-        Name, full name of the severity, the size relative to that of all runs, shape (runs,), and the size of all
-        runs in standard deviations of the fit without the run, shape (runs,).
+        Name, full name of the severity, the size relative to the size from all runs, shape (runs,), and the size of
+        all runs in standard deviations of the fit without the run, shape (runs,).
     """
     if len(whole.residuals) < 2:
         return

@@ -46,9 +46,9 @@ class FittedSet:
     Args:
         effects: names, in any order.
         share: unexplained share of the gap, a fraction; below 0 by chance.
-        excess: χ² beyond that of noise by channel, shape (6,), dimensionless.
+        excess: χ² beyond noise by channel, shape (6,), dimensionless.
         numbers: number of further parameters: freed forms and instants, less two where gravity replaces a spring.
-        outside: whether it is from outside the vocabulary: its probability is added to that of ``unknown``.
+        outside: whether it is from outside the vocabulary: its probability is added to ``unknown``.
         scatter_cost: −2 ln of the evidence of its chance differences between runs, dimensionless.
         shown_between_runs: number of its effects that only the comparison of runs shows.
     """
@@ -167,7 +167,7 @@ def misfit_scale(
     Args:
         nominal: misfit of the nominal model, and the motion.
         common: χ² of a channel that remains under every set (`common_misfit`), dimensionless.
-        chance: χ² due to chance, by channel or common to all; None: that of a superfluous effect.
+        chance: χ² due to chance, by channel or common to all; None: as for a superfluous effect.
     """
     needless = chosen.needless_chi2 if nominal.repeats else 2.0 * chosen.steepness
     by_chance = needless if chance is None else chance
@@ -199,13 +199,13 @@ def log_weight(
     """Logarithm of the weight of a set among all sets.
 
     Args:
-        left: χ² by channel beyond that of the best set, shape (6,).
+        left: χ² by channel beyond the best set's, shape (6,).
         scale: from `misfit_scale`, shape (6,).
         effects: number of effects.
         numbers: number of further parameters.
-        scatter_cost: −2 ln of the evidence of its chance differences between runs, and that of the nominal model.
+        scatter_cost: −2 ln of the evidence of its chance differences between runs, and of the nominal model's.
             The reduction that superfluous effects may bring does not count.
-        shown_between_runs: number of effects that could reduce it: those that only the comparison of runs shows.
+        shown_between_runs: number of effects that could reduce it: only the comparison of runs shows them.
     """
     own, nominal = scatter_cost
     cost = min(own + chosen.needless_scatter * shown_between_runs, max(own, nominal))

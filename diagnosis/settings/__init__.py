@@ -1,10 +1,10 @@
 """The numbers of a diagnosis that somebody varies: one field for each decision, with its origin.
 
 A field weighs answers (a probability, a prior, a price), is the false-alarm rate of a test, or fits the search to a
-campaign. Settings are arguments: `diagnosis.diagnose` takes them, and every fit has those of its data. Every other
-number that decides is a constant beside its use, ``NAME: Final = value``, with its meaning, origin and reason below
-it. docs/reference/settings.md lists both. Numerical constants (grids, iterations, paddings, tolerances of solvers)
-are in the code that uses them, too.
+campaign. Settings are arguments: `diagnosis.diagnose` takes them, and every fit has the settings of its data. Every
+other number that decides is a constant beside its use, ``NAME: Final = value``, with its meaning, origin and reason
+below it. docs/reference/settings.md lists both. Numerical constants (grids, iterations, paddings, tolerances of
+solvers) are in the code that uses them, too.
 """
 
 from __future__ import annotations

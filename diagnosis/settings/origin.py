@@ -21,7 +21,7 @@ def setting(
 
     Args:
         default: the value, in ``unit``.
-        meaning: what the value decides, in a sentence.
+        meaning: of the value, in a sentence.
         why: the reason for the value, or what it was fitted to, in a sentence or two.
         unit: ``1`` for a share, a ratio or a logarithm.
         decision: number of the document in docs/decisions with the details.
@@ -36,7 +36,7 @@ def rate(of: str, default: float = 0.001, *, why: str | None = None, origin: Ori
     Args:
         of: the test, without the full stop of its sentence.
         default: the rate, 1.
-        why: as of `setting`; None: nothing more than the rate says.
+        why: as in `setting`; None: the rate is reason enough.
     """
     usual = ONE_IN_1000 if default == 0.001 else ""
     return setting(default, f"False-alarm rate of {of}.", origin, usual if why is None else why)

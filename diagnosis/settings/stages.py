@@ -80,7 +80,7 @@ class ReadOffSettings:
     hum_run_rate: float = rate("the line of the hum in a single run", why="")
     hum_covered: float = setting(
         0.2,
-        "Maximum share of the spectrum that is searched for mains lines as plain as that of a hum: the "
+        "Maximum share of the spectrum that is searched for mains lines as plain as a hum's: the "
         "probability that a line of another source is taken for hum.",
         "judgement",
         "Beside a lower multiple of the mains the line needs no such limit.",

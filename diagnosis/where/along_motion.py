@@ -103,7 +103,7 @@ def backbones(fit: Fit) -> list[Backbone]:
 
 
 def drift(curves: list[Backbone]) -> tuple[float, float]:
-    """Departure of the curves from level: χ² beyond that of level lines, of frequency and of damping.
+    """Departure of the curves from level: χ² beyond level lines, of frequency and of damping.
 
     An effect on stiffness raises the first, one on damping the second. In each window both are equally well
     determined in ω, so they can be compared.

@@ -119,7 +119,7 @@ class BandExcess:
     """One band of the residual, all runs together.
 
     Args:
-        excess: sum of power beyond that of white noise, in units of the noise variance.
+        excess: sum of power beyond white noise, in units of the noise variance.
         mean: excess per coefficient, a ratio.
         p_value: probability of as much without a gap.
     """
@@ -172,7 +172,7 @@ class Profile:
 
     Args:
         edges: of the bins, shape (n + 1,), in the quantity's unit.
-        energy: sum over a bin of power beyond that of white noise, shape (n,), in noise variances.
+        energy: sum over a bin of power beyond white noise, shape (n,), in noise variances.
         mean: excess per residual, shape (n,); NaN where a bin is empty.
         std: of the mean where there is no gap, shape (n,).
     """

@@ -28,7 +28,7 @@ _FEWEST = 6.0  # cycles of a run in which jumps are sought
 _SMOOTH, _SLOW = 4, 2  # orders of the slow change of amplitude and phase, the first time and then
 _ROUNDS = 3  # of finding that change, each from the previous one
 _COLUMNS = 23  # of `_Oscillation.around`
-#: Of these columns, those that are not continued to a start: fast changes and kinks of both waves, and the jump.
+#: Indices of the columns that are not continued to a start: fast changes and kinks of both waves, and the jump.
 _OF_JUMPS = (5, 6, 10, 11, 20, 21)
 _AT_ONCE = 200  # instants, which bounds the memory
 _FREE = 0.015  # departure of the start over the swing, root mean square, that every run may have
@@ -160,7 +160,7 @@ def jumps(fit: Fit) -> list[Jumps]:
     """The jumps of every free decay that is long enough.
 
     Args:
-        fit: of the nominal model, whose frequencies are close to those of the runs.
+        fit: of the nominal model; its frequencies are close to the runs'.
     """
     return [found for index in range(len(fit.problem.data.runs)) if (found := _of_run(fit, index))]
 

@@ -208,7 +208,7 @@ class Maps:
         return math.sqrt(sum(run.std**2 for run in self.runs)) / len(self.runs)
 
     def rounded(self) -> Maps:
-        """The same with the digits of a document in its arrays."""
+        """These maps with the digits of a document in their arrays."""
         return replace(self, **{name: _rounded(value) for name, value in vars(self).items()})
 
     def to_json_dict(self) -> dict[str, Any]:

@@ -53,7 +53,7 @@ class Survey:
         time_interval: shortest interval of time with most of the excess, s; None where there is no excess.
         amplitude_interval: shortest interval of amplitude with most of it, rad.
         frequency_interval: shortest interval of frequency with most of it, Hz.
-        moment_energy: energy of the apparent moment beyond that of noise, by bin of time, shape (n,), in variances.
+        moment_energy: energy of the apparent moment beyond noise, by bin of time, shape (n,), in variances.
         moment_z: the sum of that over its standard deviation under white noise, a ratio.
     """
 
@@ -206,7 +206,7 @@ def _frequency_interval(
 
 
 def with_answer(found: Survey, campaign: Campaign, nominal: Fit, answer: Fit) -> Maps:
-    """The maps with the residuals of a fit with the causes beside those of the nominal model."""
+    """The maps with the residuals of a fit with the causes beside the nominal model's."""
     after = _spectrum(run_excesses(campaign, answer), _log_edges(found.excesses)).mean
     return replace(
         found.maps,

@@ -25,7 +25,7 @@ from identification.statistics import determined, eliminate, embed, inverse, sca
 from tunnel_sim.vocabulary.campaign import RigProperties, Run
 from tunnel_sim.vocabulary.record import Array
 
-# All four columns of φ, even those that the runs do not separate: the prior determines these.
+# All four columns of φ; the prior determines the columns that the runs do not separate.
 _DESIGN = Design((np.zeros((2, 4)),), {"g": 0, "n": 1, "d": 2, "m": 3}, np.zeros(0), np.zeros(0), True)
 _NO_SCORE = np.zeros(5)
 _COEFFICIENTS = [PARAMETERS.index("cn_beta"), PARAMETERS.index("cn_r")]

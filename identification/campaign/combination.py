@@ -44,7 +44,7 @@ class RunDecay:
 
     Args:
         gained: decay rate, stiffness and gain of its input; None where they were not found.
-        instead: why the result is that of another method, and a remedy; None where it is the method's own.
+        instead: why another method gave the result, and a remedy; None where it is the method's own.
     """
 
     estimate: RunEstimate
@@ -143,7 +143,7 @@ class RunByRun(ABC):
     takes_driven: ClassVar[bool] = False
 
     def estimate(self, campaign: Campaign) -> Estimate:
-        """Identify every run, then the campaign from those that could be identified.
+        """Identify every run, then the campaign from the identified runs.
 
         Raises:
             TunnelError: a wind-on run states no air density, or the method does not take a run; raised before any

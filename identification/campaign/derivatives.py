@@ -47,7 +47,7 @@ class Design:
 
     Args:
         links: one (2, p) matrix per run: (aᵢ, kᵢ) = Lᵢ φ.
-        columns: places in φ of those of g, n, d, m that the campaign separates.
+        columns: places in φ of the parameters g, n, d, m that the campaign separates.
         stiffness_loads: ½ρV²·A·l per run, N m, shape (r,); without A·l where the size is unknown.
         damping_loads: ½ρV·A·l² per run, N m s, shape (r,); without A·l² where the size is unknown.
     """

@@ -41,7 +41,7 @@ def joint_estimate(
 
     Args:
         fitted: every run's own fit, which starts the joint one, in the campaign's order.
-        statuses: those that follow from the runs.
+        statuses: as they follow from the runs.
     """
     campaign, runs = linked.campaign, linked.runs
     estimate = replace(estimate, remarks=linked.remarks)

@@ -168,7 +168,7 @@ def _gain_sought(run: Run, place: int | None) -> bool:
 
 
 def _joined_runs(runs: Sequence[Run], rig: RigProperties) -> set[str]:
-    """Ids of the runs that are fitted together: those of stated stiffness.
+    """Ids of the runs of stated stiffness, which are fitted together.
 
     Without a known moment or a spring in any of them, a body without a spring does not determine the inertia.
     """

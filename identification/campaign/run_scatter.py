@@ -175,7 +175,7 @@ class ScatterFit:
 
         Args:
             noise: covariance without scatter, shape (q, q).
-            moved: as of `moved`.
+            moved: as `moved` returns it.
 
         Returns:
             The covariance, shape (q, q), and the contribution of each kind of scatter to it.

@@ -1,4 +1,4 @@
-"""The estimators, one per file, and their registry, with those of installed packages and registered ones.
+"""The estimators, one per file, and their registry, with estimators of installed packages and registered ones.
 
 To add one, write a frozen dataclass with the members of `Estimator`, whose fields are its settings, and add a
 line to `SUMMARIES`. The file has the estimator's name, and the class has that name in CamelCase, as in
@@ -61,7 +61,7 @@ SUMMARIES: Mapping[str, str] = {
 """Method and purpose of each estimator by name, one line for the help of the command line."""
 
 DRIVEN_ONLY: tuple[str, ...] = ("frequency_response",)
-"""Those that do not take free decays."""
+"""Estimators that do not take free decays."""
 
 ALL_ESTIMATORS: tuple[str, ...] = tuple(name for name in SUMMARIES if name not in DRIVEN_ONLY)
 """The packaged ones that take free decays."""
@@ -132,7 +132,7 @@ def register_from(word: str) -> str:
 
 
 def known_estimators() -> tuple[str, ...]:
-    """The names of all estimators: the packaged ones, those of installed packages, then registered ones."""
+    """The names of all estimators: packaged ones, then from installed packages, then registered ones."""
     return tuple(dict.fromkeys((*SUMMARIES, *added_to(ENTRY_POINTS), *_registered)))
 
 
@@ -166,7 +166,7 @@ def make_estimator(name: str) -> Estimator:
 
 
 def free_decay_estimators() -> tuple[str, ...]:
-    """The names of all estimators except those for driven runs only."""
+    """The names of all estimators that take free decays."""
     return tuple(name for name in known_estimators() if name not in DRIVEN_ONLY)
 
 
@@ -176,7 +176,7 @@ def takes_driven(estimator: Estimator) -> bool:
 
 
 def estimators_of_driven_runs() -> tuple[str, ...]:
-    """The names of all estimators that take driven runs, without those that cannot be loaded."""
+    """The names of all loadable estimators that take driven runs."""
     found = []
     for name in known_estimators():
         with suppress(TunnelError):
@@ -226,7 +226,7 @@ class Own:
 
 
 def own_estimators(names: Iterable[str]) -> tuple[Own, ...]:
-    """Those among some estimators that are not packaged."""
+    """The members of a list of estimators that are not packaged."""
     found = []
     for name in names:
         if name in SUMMARIES:

@@ -1,7 +1,7 @@
 """The paper's conventional method: spectrum, time to half amplitude, wind-on against wind-off.
 
-Standard deviations of frequency f and decay rate σ are propagated from the noise, without the bias of the
-method; that of σ is the scatter of the peaks where it is larger beyond chance. The pairs are compared by eqs 7, 8,
+Standard deviations of frequency f and decay rate σ are propagated from the noise, without the bias of the method;
+the deviation of σ is the scatter of the peaks where it is larger beyond chance. The pairs are compared by eqs 7, 8,
 17 and 18 (`identification.campaign.pairing`).
 """
 

@@ -43,7 +43,7 @@ class FilterError(RunByRun):
     """Maximum likelihood with measurement and process noise.
 
     A run's ``process_noise`` is the random moment's spectral intensity q over the inertia,
-    ⟨w(t)w(t′)⟩ = q δ(t − t′); where its spectrum is not flat, that at the natural frequency.
+    ⟨w(t)w(t′)⟩ = q δ(t − t′); where its spectrum is not flat, q at the natural frequency.
 
     Args:
         blocks_per_cycle: block means per period that the filter uses, at least.

@@ -31,7 +31,7 @@ _TIMER_DECIMALS = 10  # decimal steps that a timer's step must exceed, or any st
 _SWEEPS = 8
 _NO_GAP = 1.75  # usual steps: a longer one may be a gap
 _MOST_MISSING = 1e3  # ticks per sample: with more, the stamps are not from one clock
-_SLOW = 0.3  # mean square of a step over the variance, 4 sin²(π/n): that of n = 11.5 samples per cycle
+_SLOW = 0.3  # mean square of a step over the variance, 4 sin²(π/n): n = 11.5 samples per cycle
 
 
 def noted_readings(campaign: Campaign) -> tuple[Remark, ...]:
@@ -42,7 +42,7 @@ def noted_readings(campaign: Campaign) -> tuple[Remark, ...]:
     sensor = campaign.sensor
     if sensor.derivative:
         what = (
-            f"the readings are {sensor.quantity}s: omega_n and zeta are those of the angle, and its amplitude "
+            f"the readings are {sensor.quantity}s: omega_n and zeta describe the angle, and its amplitude "
             f"follows from them; zero and noise are in {sensor.unit}"
         )
         remedy = "state quantity = 'angle' under [sensor] if the readings are angles"
@@ -262,7 +262,7 @@ def find_clock(time_s: Array) -> SampleClock | None:
             break
     changes = np.diff(np.sort(steps))
     changes = changes[changes > max(_TIMER_DECIMALS * allowed, CLOCK_TOLERANCE * float(steps.max()))]
-    if changes.size:  # step of a timer whose multiples all steps between stamps may be
+    if changes.size:  # all steps between stamps may be multiples of a timer's step
         whole = np.round(steps / changes.min())
         step = float(steps @ whole / (whole @ whole))
         if np.abs(steps - step * whole).max() < allowed + _ON_LATTICE * step:

@@ -98,8 +98,8 @@ def _standstill(record: Record, crossings: Array, held: int) -> int:
         return int(end)
     if fit.runs[0].decay.rate * part.duration < -_GROWTH:
         return 0
-    # β = e^{-at}(C cos ωt + S sin ωt) has its turning points where (Sω - aC) cos ωt = (Cω + aS) sin ωt: those from
-    # two cycles before the first sample of the fit to one after, in samples.
+    # β = e^{-at}(C cos ωt + S sin ωt) has its turning points where (Sω - aC) cos ωt = (Cω + aS) sin ωt: the ones
+    # from two cycles before the first sample of the fit to one after, in samples.
     run, decay = fit.runs[0], fit.runs[0].decay
     cosine, sine = run.angle, (run.rate + decay.rate * run.angle) / decay.omega_d
     phase = np.arctan2(sine * decay.omega_d - decay.rate * cosine, cosine * decay.omega_d + decay.rate * sine)

@@ -46,7 +46,7 @@ class Demodulated:
         third: of the third harmonic, shape (w,).
         noise: standard deviation of a block mean within the windows, rad.
         samples: block means in each window, shape (w,).
-        fast_noise: noise between neighbouring samples of the record over that of white noise of the same level.
+        fast_noise: noise between neighbouring samples of the record over white noise of the same level.
         duration: of the record, s.
     """
 

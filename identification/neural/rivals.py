@@ -38,7 +38,7 @@ class RivalConditions:
         stiffness_load: ½ρV²·A·l, shape (runs,), N m; 0 with the wind off.
         damping_load: ½ρV·A·l², shape (runs,), N m s; 0 with the wind off.
         speed: V as a ratio to the largest of the campaign, shape (runs,); 0 with the wind off.
-        spring: number of the spring among those of the campaign, from the softest, shape (runs,).
+        spring: number of the spring in the campaign, from the softest, shape (runs,).
         air: Cnβ and Cnr of the nominal fit, 1/rad; 0 where they are not determined.
     """
 
@@ -143,7 +143,7 @@ def best_step(run: Demodulated, values: Array) -> Array:
 SETS = (2, 3, 4)
 """Numbers of columns in the larger rivals, found by forward selection; one more rival has all columns."""
 MORE = len(SETS) + 2
-"""Rivals besides those of one column: the nominal model first; the sets and all columns together last."""
+"""Rivals besides the ones of one column: the nominal model first; the sets and all columns together last."""
 _PRIOR = 1e-6  # variance of a column's own fit over the prior variance of its effect: 1000 deviations
 _PRIOR_ALL = 1e-3  # the same ratio where all columns act together
 

@@ -42,7 +42,7 @@ class Shape:
 def normalise(points: Array) -> Shape:
     """Remove the mean, and scale the largest value of the first half cycle to 1.
 
-    The largest value is that of a quartic through the points of the half cycle, less sensitive to noise. The scale
+    The largest value comes from a quartic through the points of the half cycle, less sensitive to noise. The scale
     is 0 or less where the half cycle does not rise above the mean.
 
     Args:

@@ -1,4 +1,4 @@
-"""Training of both networks from a seed: several starts each, of which the one of largest evidence is chosen.
+"""Training of both networks from a seed: of several starts each, the one of largest evidence is chosen.
 
 Full-batch Levenberg–Marquardt in torch float64, on one thread and in a fixed order: the same start gives identical
 weights on the same machine and version of torch, also after resuming from a checkpoint.

@@ -257,7 +257,7 @@ def as_notebook(blocks: Iterable[Block]) -> str:
 
 
 def as_html(blocks: Iterable[Block], drawn: Mapping[str, str] | None = None, *, titled: bool = False) -> str:
-    """Blocks as HTML, whose look is that of the page's style sheet.
+    """Blocks as HTML; the page's style sheet gives the look.
 
     Args:
         drawn: HTML of the figures by name; others are left out.

@@ -1,6 +1,6 @@
 """Numbers as text: with their deviations, as shares and probabilities, and readings in customary units.
 
-Two significant digits of the standard deviation determine those of the value.
+Two significant digits of the standard deviation determine the digits of the value.
 """
 
 from __future__ import annotations

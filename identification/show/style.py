@@ -167,7 +167,7 @@ def _fit(steps: Sequence[float], limits: tuple[float, float], room: float) -> bo
 def limit_to_known(axes: Axes, values: Array, stds: Array) -> None:
     """Limit the vertical axis to values of usual uncertainty, with their 95 % intervals.
 
-    Otherwise a few very uncertain values, such as those of the last cycles of a decay, would determine the scale.
+    Otherwise a few very uncertain values, such as the last cycles of a decay, would determine the scale.
     Their intervals extend beyond the axis.
 
     Args:

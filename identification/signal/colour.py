@@ -1,7 +1,7 @@
 """Coloured noise of the sensor: its spectrum between the harmonics of the motion, as an autoregression.
 
 The misfit of a model is concentrated at the frequency of the motion and its harmonics. The spectrum of a residual
-between them is therefore that of the noise, whatever the model, and noise of a smooth spectrum has the power at the
+between them is therefore the noise's, whatever the model, and noise of a smooth spectrum has the power at the
 harmonics that its neighbours show. An autoregression of that spectrum gives the power of the noise at any
 frequency, and it whitens the residual, so that one test of the model serves white and coloured noise. `tunnel
 diagnose` takes its spectra from the same ordinates and whitens by the same recursion.
@@ -101,7 +101,7 @@ class Periodogram:
 def levinson(covariance: Vector) -> Iterator[tuple[Array, float]]:
     """Whitening filters of rising order and the variances of their innovations, from an autocovariance.
 
-    S. M. Kay, Modern Spectral Estimation (1988), sect. 6.3. The first is that of white noise.
+    S. M. Kay, Modern Spectral Estimation (1988), sect. 6.3. The first is for white noise.
 
     Args:
         covariance: at lags from zero on, shape (n,).
@@ -141,7 +141,7 @@ def steady(power: Array, count: Array, rate: float) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True, eq=False)
 class Autoregression:
-    """Coloured noise of a run: a filter makes it of white noise. Frequencies are multiples of that of the motion.
+    """Coloured noise of a run: a filter makes it of white noise. Frequencies are multiples of the motion's.
 
     Args:
         whitening: from values to innovations, its first tap 1, shape (order + 1,).
@@ -199,7 +199,7 @@ class Autoregression:
     def freedom(self) -> float:
         """Degrees of freedom of the power at the frequency of the motion, by the delta method.
 
-        The covariance of the taps is that of H. B. Mann and A. Wald, Econometrica 11 (1943) 173, doi
+        The covariance of the taps is from H. B. Mann and A. Wald, Econometrica 11 (1943) 173, doi
         10.2307/1905674.
         """
         turns = self._turns(1.0)
@@ -208,7 +208,7 @@ class Autoregression:
         return float(2.0 * self.count / (2.0 + self.innovations * spread))
 
     def near_motion(self, residual: Angles) -> tuple[float, float]:
-        """Power within a quarter of the motion's frequency, over that of the noise.
+        """Power within a quarter of the motion's frequency, over the noise's.
 
         Returns:
             The sum of independent squares, which have a mean of 1 in noise alone, and their number.

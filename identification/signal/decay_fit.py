@@ -59,7 +59,7 @@ class Reading:
         return replace(cls.from_record(run.record), forcing=forcing_of(run, derivative))
 
     def residual(self, state: RunUnknowns, rows: Rows) -> Angles:
-        """Reading less model; ``rows`` are those of the forcing at the decay."""
+        """Reading less model; ``rows`` are the forcing's at the decay."""
         free = self.forcing.freed(self.yaw, rows, state.gain)
         return np.asarray(free - state.zero * rows[4] - state.angle * rows[0] - state.rate * rows[1])
 
@@ -195,7 +195,7 @@ def fit_run(
 
 
 def project_run(reading: Reading, decay: Decay) -> tuple[RunFit, float] | None:
-    """The best initial state and zero of a free decay for given parameters, such as those of another method.
+    """The best initial state and zero of a free decay for given parameters, such as another method's.
 
     Returns:
         The run at that decay and its sensor zero in rad; None where the decay overflows.

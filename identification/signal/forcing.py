@@ -1,4 +1,4 @@
-"""The forcing of a run: what its input adds to the model of its motion. A free decay is a run with zero input.
+"""The forcing of a run: the effect of its input on the motion. A free decay is a run with zero input.
 
 The motion is β̈ + 2aβ̇ + kβ = g u(t) + a constant, exact for an input that is held or linear between samples. It is
 linear in the initial angle and rate, in the gain g per unit inertia and in the sensor's zero. A body without a
@@ -184,7 +184,7 @@ class Forced(Free):
         return 0.0 < decay.stiffness < (np.pi / float(np.diff(time).min())) ** 2
 
     def rows(self, time: Times, decay: Decay) -> Rows:
-        """The rows of a free decay, then those of the input."""
+        """The rows of a free decay, then of the input."""
         return np.vstack([super().rows(time, decay), self.responses(time, decay)])
 
     def weights(self, state: RunUnknowns) -> Array:

@@ -311,7 +311,7 @@ def peak_decay(record: Record, frequency: float, noise: PeakNoise) -> PeakDecay 
 
     The zero is the mean of (p₁ + 2p₂ + p₃)/4 over neighbouring peaks, which are evenly placed about it. Peaks
     are followed until they fall below a tenth of the first. Where they scatter about the line more than the noise
-    does, beyond chance, the deviation is that of the scatter. None where there are fewer than four peaks.
+    does, beyond chance, the deviation comes from the scatter. None where there are fewer than four peaks.
 
     Args:
         frequency: of the oscillation, Hz.

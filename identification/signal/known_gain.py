@@ -49,9 +49,7 @@ def _refuse_other_gain(run: Run, drive: Input, derivative: int, where: str, *, j
         what = (
             f"the motion follows {column} with the other sign: a base that accelerates leaves the body behind"
         )
-        raise TunnelError(
-            what, where=where, remedy="turn the sign of the acceleration, or that of the reading"
-        )
+        raise TunnelError(what, where=where, remedy="turn the sign of the acceleration or of the reading")
     unit = "degrees" if degrees else "radians in place of degrees"
     what = f"the motion follows {column} with a gain of {-ratio:.3g} in place of −1, as if it were in {unit}"
     raise TunnelError(what, where=where, remedy="convert it to rad/s2, and the reading to rad")

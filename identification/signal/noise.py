@@ -81,7 +81,7 @@ class ReadingNoise:
 
     @property
     def variance(self) -> float:
-        """That of white noise with its power at the frequency of the motion, rad²."""
+        """The variance of white noise with the same power at the frequency of the motion, rad²."""
         return self.level.std**2 * self.level.slow_ratio
 
 

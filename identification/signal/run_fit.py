@@ -223,7 +223,7 @@ def describe_run(
 ) -> RunEstimate:
     """The result of one run from its decay, whatever the method.
 
-    The initial state and the zero are those that fit the decay best; their uncertainty combines the reading's and
+    The initial state and the zero fit the decay best; their uncertainty combines the reading's and
     the decay's. The only status is NOT_DETERMINED, where the covariance is not positive definite.
 
     Args:
@@ -338,7 +338,7 @@ class ResidualCheck:
         return self.noise.std * float(np.sqrt(self.noise.slow_ratio))
 
     def widened(self, covariance: Array) -> Array:
-        """A covariance of (a, k), shape (2, 2), raised to that of least squares where the model departs."""
+        """A covariance of (a, k), shape (2, 2), raised to least squares' where the model departs."""
         if not self.noise.departs:
             return covariance
         return widened_covariance(covariance, np.sqrt(self.covariance.diagonal()))
@@ -417,7 +417,7 @@ def _series(
 
 
 def _start_at(reading: Reading, begin: int, decay: Decay, cycles: int) -> Decay:
-    # Where one decay does not fit the preceding windows, its values may be far from those of the next window.
+    # Where one decay does not fit the preceding windows, its values may be far from the next window's.
     part = slice(begin, int(np.searchsorted(reading.time, reading.time[begin] + _length(decay, cycles))))
     if part.stop - part.start < _LEAST_SAMPLES or part.stop >= reading.time.size:
         return decay

@@ -27,7 +27,7 @@ class Strokes:
         turns: indices of the reversals among the samples, shape (n + 1,).
         angle: at the reversals, rad, shape (n + 1,).
         lost: energy that friction and damping have taken, J, shape (n,).
-        spread: standard deviation of those angles over that of white noise of a sample, a ratio, shape (n + 1,).
+        spread: standard deviation of those angles over a white-noise sample's, a ratio, shape (n + 1,).
     """
 
     turns: NDArray[np.int64]

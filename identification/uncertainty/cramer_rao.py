@@ -170,7 +170,7 @@ def campaign_bound(
     truths = []
     for run, load, damping in zip(runs, design.stiffness_loads, design.damping_loads, strict=True):
         rate, gain = 0.5 * (truth.mechanical_damping - damping * truth.cn_r), 0.0
-        if run.drive is not None and not run.drive.kind.by_inertia:  # whose gain depends on no parameter
+        if run.drive is not None and not run.drive.kind.by_inertia:  # its gain depends on no parameter
             gain = run.drive.kind.scale * drive_gain if run.input_gain is None else run.input_gain
         truths += [rate, (run.spring_stiffness or 0.0) - load * truth.cn_beta, gain]
     parameters: Array = np.linalg.lstsq(

@@ -1,4 +1,4 @@
-"""The most informative drive for Cnβ and Cnr, among those that a plan can express and a rig allows.
+"""The most informative drive for Cnβ and Cnr, among the drives that a plan can express and a rig allows.
 
 Inputs are compared by the Cramér–Rao bound of the nominal model at the plan's truth, with the noise of its sensor
 and the random moments of the plan. The response is linear in the input, so the limits determine the amplitude.
@@ -224,7 +224,7 @@ def propose_drive(
         _band("multisine")([outer[0] / _BROAD, outer[1] * _BROAD]),
         *(_moved(_band(k), [outer[0] / _WIDER, outer[1] * _WIDER], score) for k in ("multisine", "chirp")),
     ]
-    rates = resonances  # of a stepped sine, without those whose time is better spent on the others, Hz
+    rates = resonances  # of a stepped sine, Hz; time may be better spent on fewer
     while len(rates) > 1:
         shorter = min(
             ([*rates[:i], *rates[i + 1 :]] for i in range(len(rates))), key=lambda left: score(_stepped(left))

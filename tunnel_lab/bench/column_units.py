@@ -1,4 +1,4 @@
-"""The columns of dropped files: what they are, whether they are used, and fields for their units."""
+"""The columns of dropped files: meaning, use, and fields for their units."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.inputs import without_spring_needs_input
 
 Cells = dict[str, dict[str, str]]
-"""Texts by run and key; those of the rig under `RIG`."""
+"""Texts by run and key; the rig's under `RIG`."""
 Words = dict[tuple[str, str], str]
 """Faults by row and key: one line for each cell."""
 RIG = ""
@@ -176,7 +176,7 @@ def _driven(folder: Path, versions: tuple[tuple[int, int], ...]) -> frozenset[st
 def restore(
     session: Session, before: Cells, held: Mapping[str, Mapping[str, float]] = MappingProxyType({})
 ) -> None:
-    """Restore the conditions stated before a campaign was rewritten; errors as of `save`.
+    """Restore the conditions stated before a campaign was rewritten; errors as in `save`.
 
     Args:
         held: conditions from the files that the campaign takes only with an air density, by row and key.
@@ -225,7 +225,7 @@ def _with(table: Mapping[str, Any], cells: Mapping[str, str], keys: tuple[str, .
 
 
 def _without_density(runs: Sequence[str], count: int) -> str:
-    """What is missing in wind-on runs without an air density, in one line."""
+    """The air density that wind-on runs lack, in one line."""
     more = f" and {len(runs) - _MOST_LINES} more" if len(runs) > _MOST_LINES else ""
     once = ", or once under “Same for all runs”" if count > 1 else ""
     words = f"wind-on without air density: give it in kg/m³ (about 1.2 for air) in the marked cells{once}"

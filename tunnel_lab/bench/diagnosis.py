@@ -254,7 +254,7 @@ class ShownAnswer:
 
 
 class ByHandPart:
-    """Switches for the causes, initially those of the diagnosis, and the closure with them."""
+    """Switches for the causes, initially as diagnosed, and the closure with them."""
 
     def __init__(self, session: Session, answer: Diagnosis) -> None:
         from tunnel_sim.effects import known_effects

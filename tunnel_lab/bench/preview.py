@@ -49,7 +49,7 @@ class Mark:
         rest: the reading at rest, in the reading's unit.
         about: the source of ``rest`` in words: its uncertainty, or that it is stated.
         fault: the reason for leaving the run out; empty where it is used.
-        doubts: what the user has to judge, in one line each; empty where the run looks like a free decay.
+        doubts: for the user to judge, in one line each; empty where the run looks like a free decay.
         added: whether the user has added it.
     """
 
@@ -237,13 +237,13 @@ def leave_out(session: Session, names: Sequence[str]) -> None:
     """State which files and runs are left out.
 
     Raises:
-        TunnelError: when a name is not that of a file or run.
+        TunnelError: when there is no file or run of a name.
     """
     state(session, {"leave_out": tuple(names)})
 
 
 def drawn(imported: Imported, order: Sequence[str] = ()) -> list[DrawnRecord]:
-    """The first records, with their runs; those with a run to judge come first.
+    """The first records, with their runs; records with a run to judge come first.
 
     Args:
         order: keys of the records that are drawn already, which keep their places.
@@ -277,7 +277,7 @@ def drawn(imported: Imported, order: Sequence[str] = ()) -> list[DrawnRecord]:
 
 
 def doubts_of(part: ImportedRun) -> tuple[str, ...]:
-    """What the user has to judge in the motion of a run, in one line each, as the import states it."""
+    """The doubts about the motion of a run for the user to judge, one line each, as the import states them."""
     if part.run is None:
         return () if part.said[-1] == LEFT_OUT else (part.said[-1],)
     return tuple(remark.motion for remark in part.said if isinstance(remark, ImportRemark) and remark.motion)

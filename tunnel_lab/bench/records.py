@@ -332,7 +332,7 @@ class RecordsPage:
         return chart
 
     def _show_runs(self, record: preview.DrawnRecord, *, alone: bool) -> None:
-        """What is to be judged in a record, and buttons for its runs, unless one is ``alone`` in the campaign."""
+        """The doubts about a record, and buttons for its runs, unless one is ``alone`` in the campaign."""
         shown = alone, [(mark.run, mark.doubts, mark.added, mark.is_left_out) for mark in record.marks]
         if self._shown_runs.get(record.key) == shown:
             return  # a button that is being pressed stays

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 HOST = "127.0.0.1"
 _OTHERS_MASK = 0o077
-"""Permissions removed from files and folders that the bench and its commands write: all those of other users."""
+"""Permissions removed from files and folders that the bench and its commands write: all of other users."""
 _CONFLICT = 409  # HTTP status of requests that the present files do not allow
 _LENGTH = re.compile(r"[0-9]{1,20}")
 

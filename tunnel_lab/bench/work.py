@@ -198,7 +198,7 @@ async def closure(runs: Runs, effects: Sequence[str], *, converged: bool) -> Clo
 
 
 async def next_run(runs: Runs, first: Sequence[str], second: Sequence[str]) -> NextRun | None:
-    """The run that would distinguish two sets of effects; None in normalised form; errors as of `closure`."""
+    """The run that would distinguish two sets of effects; None in normalised form; errors as in `closure`."""
     answers = tuple(sorted(first)), tuple(sorted(second))
     found: NextRun | None = await _in_fitter(_answered, runs, "next_run", *answers)
     return found

@@ -27,7 +27,7 @@ from tunnel_sim.vocabulary.errors import counted
 HELP = """Blind tests of the diagnosis: make campaigns, diagnose them, score the answers.
 
 Campaigns are drawn and simulated by the reference simulator, whose integrator
-and forms of effects differ from those of the fits. Their truth is written
+and forms of effects differ from the fits'. Their truth is written
 to a separate key, and its salted SHA-256 is published with the data.
 
 [bold]Order[/bold]
@@ -67,7 +67,7 @@ class MixtureOptions:
         float,
         _share(
             "--variety",
-            help="Share with another scale, and the same share each with few runs, coloured noise and uneven "
+            help="Share of campaigns with another scale; as many each have few runs, coloured noise and uneven "
             "time stamps.",
         ),
     ] = 0.25

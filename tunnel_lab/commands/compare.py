@@ -32,7 +32,7 @@ def compare(
 ) -> None:
     """Compare diagnoses, such as before and after a repair of the rig.
 
-    For each diagnosis: the gap (its power over that of the noise) without and with
+    For each diagnosis: the gap (its power over the noise's) without and with
     the causes, the causes with their parameters, and the coefficients with standard
     deviations. The last table shows the difference of each coefficient from the
     first diagnosis; it assumes that the campaigns are independent. In CSV and JSON
@@ -62,7 +62,7 @@ def compare(
 
 @dataclass(frozen=True)
 class Entry:
-    """What one diagnosis states of a quantity: in words, and as a number where it is one."""
+    """A quantity as one diagnosis states it: in words, and as a number where there is one."""
 
     text: str = _NONE
     number: Quantity | None = None

@@ -133,7 +133,7 @@ class OwnModel:
             "--free",
             metavar="A,B",
             help="Parameters of the model to fit: inertia, damping, stiffness, rest (a constant moment where "
-            "nothing holds the joint), gain (the kp of a position servo). Default: those that the runs can "
+            "nothing holds the joint), gain (the kp of a position servo). Default: what the runs can "
             "determine.",
             callback=split_names,
         ),

@@ -149,7 +149,7 @@ def run(
 
     [bold]Uncertainty[/bold]
       By default, standard deviations include sensor noise and the scatter between
-      runs. --budget adds the choice of model, and --uncertainties those of the
+      runs. --budget adds the choice of model, and --uncertainties the errors of the
       stated Kr, V, ρ, A and l. The combined standard uncertainty is then reported,
       and a table shows the dominant source.
 

@@ -63,7 +63,7 @@ class ScoredRecords:
 
 @dataclass(frozen=True)
 class ScoreView:
-    """What is shown of the score, and its baselines."""
+    """The shown part of the score, and its baselines."""
 
     cells: Annotated[bool, Option("--cells", help="Also show every cell.")] = False
     check: Annotated[

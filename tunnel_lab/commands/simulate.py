@@ -180,7 +180,7 @@ def plan_drive(
         Goal, Option("--goal", help="d: both coefficients, by the determinant; cn_r: Cnr alone.")
     ] = Goal.D,
     minutes: Annotated[
-        float | None, Option("--minutes", help="Rig time, minutes. Default: that of the free decays.")
+        float | None, Option("--minutes", help="Rig time, minutes. Default: as for the free decays.")
     ] = None,
     buffeting: Annotated[
         float | None,
@@ -200,7 +200,7 @@ def plan_drive(
     stepped sine with the lowest Cramér–Rao bound, as large as both limits allow.
     The response stays within its limit if the prior guess is right: leave a margin.
 
-    Rig time is that of the records, plus 60 s for each record, 300 s for each change
+    Rig time is the records' duration, plus 60 s for each record, 300 s for each change
     of spring and 60 s for each change of speed. With buffeting, the bound includes
     the random moment; identify the runs with filter_error. Other effects of the
     plan are ignored.

@@ -68,7 +68,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
             diagnosis preset only.
         targets: relative standard deviations (fractions) of Cnβ and Cnr at which an identification ends.
         probability: of one effect (a probability) at which a diagnosis ends.
-        costs: rig time of a run, `Costs` or some of its times by name, s; None: those of `Costs`.
+        costs: rig time of a run, `Costs` or some of its times by name, s; None: the defaults of `Costs`.
         seconds_per_nat: rig time that a nat is worth, s.
         rig: path of a rig description; None takes the packaged rig.
         scatter: differences between the runs, a `Scatter` or some of its numbers by name; None: no differences.

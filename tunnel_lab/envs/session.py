@@ -345,7 +345,7 @@ def draw_truth(
     Every number is always drawn; an option therefore does not change the other numbers.
 
     Args:
-        severities: the effects, one of which acts, all equally probable, with severities log-uniform in their
+        severities: the effects; one of them acts, all equally probable, with severities log-uniform in their
             ranges (SI units); empty: no effect acts.
 
     Raises:

@@ -116,7 +116,7 @@ def in_phase(
     """The truth that an estimator should recover: Cnβ and Cnr in phase with angle and rate (decision 0004).
 
     Args:
-        effects: those that act, a lag of the air among them or not.
+        effects: all that act, with or without a lag of the air.
         conditions: spring stiffness (N m/rad), wind speed (m/s) and air density (kg/m³) of every run.
     """
     runs = []

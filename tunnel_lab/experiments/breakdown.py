@@ -93,7 +93,7 @@ class BiasCase:
         reached: excess after the reference simulator's nominal refit, in noise variances (a ratio).
         realisation: number of the realisation, from 0.
         bound: Cramér–Rao bound of the nominal model by quantity, SI.
-        truth: by quantity, SI; with a lag of the air Cnβ and Cnr are those in phase with angle and rate.
+        truth: by quantity, SI; with a lag of the air, Cnβ and Cnr in phase with angle and rate.
     """
 
     effect: str

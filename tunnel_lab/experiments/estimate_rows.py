@@ -105,7 +105,7 @@ def counted_failures(failures: Iterable[Failed]) -> tuple[Failed, ...]:
 
 
 def failures_in(table: pl.DataFrame, by: Sequence[str], seen: Iterable[Failed]) -> tuple[Failed, ...]:
-    """The failures in a table of results, some of which were made by an earlier command.
+    """The failures in a table of results, also from an earlier command.
 
     Args:
         table: with ``estimator``, ``status`` and ``message``.

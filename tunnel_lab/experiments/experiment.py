@@ -70,12 +70,12 @@ class Experiment(Generic[TaskT]):
     """One experiment of any kind.
 
     Args:
-        kind: its name, and that of its manifest.
+        kind: its name, also the manifest's.
         tasks: in the order of the results.
         work: on a task: a pure function of a module with its data, sent to the workers with every task.
         name: of a task's files, without suffix.
         description: all that determines the results, but for the code, in JSON's types.
-        estimators: names of those that the work uses.
+        estimators: names of the ones that the work uses.
         datasets: names of its tables; the results come first.
         weight: of a task in the progress.
         about: further entries of the manifest, for people.
@@ -121,7 +121,7 @@ def _code() -> str:
 
 
 def made_with(estimators: Sequence[str], code_matters: bool) -> dict[str, str]:
-    """Versions and processor, with the code of the user's estimators, and that of this project where it matters."""
+    """Versions and processor, with the code of the user's estimators, and of this project where it matters."""
     own = {f"{_OWN}{one.name}": one.code for one in own_estimators(estimators)}
     return {**versions(), **own, **({"code": _code()} if code_matters else {})}
 
@@ -334,7 +334,7 @@ def run(
 def run_in(
     experiment: Experiment[TaskT], folder: Path, workers: Workers, progress: Progress | None = None
 ) -> tuple[Parts[TaskT], CommandOutcome]:
-    """Begin or continue an experiment in a folder, after which its results are complete; errors as of `begin`."""
+    """Begin or continue an experiment in a folder, after which its results are complete; errors as in `begin`."""
     store = begin(experiment, folder)
     outcome = run(experiment, store, workers, progress)
     for dataset in (*experiment.datasets, CHECKSUMS):  # partial files of a killed command

@@ -112,7 +112,7 @@ def answer_rows(
     """One estimator on one campaign of known truth.
 
     Args:
-        truth: by quantity, SI; ζ and ωn are those of the first run.
+        truth: by quantity, SI; ζ and ωn for the first run.
         bound: the Cramér–Rao bound by quantity, SI; quantities without one are left out.
 
     Returns:

@@ -38,7 +38,7 @@ def trials_of(rows: pl.DataFrame, *, percent: bool = False) -> Trials:
 
     Args:
         rows: with ``truth``, ``value``, ``std``, ``bound`` and ``unit``.
-        percent: whether in % of the truths, none of which is then zero.
+        percent: whether in % of the truths, which are then not zero.
     """
     given = rows.filter(pl.col("value").is_not_null())
     truth, value, std = (given[name].to_numpy() for name in ("truth", "value", "std"))
@@ -231,7 +231,7 @@ def score_table(
 
 
 def meanings(*tables: Sequence[ScoreColumn]) -> Paragraph:
-    """What the columns of some tables mean, each said once."""
+    """The meaning of the columns of some tables, each once."""
     said = dict.fromkeys(column.what for columns in tables for column in columns if column.what)
     return Paragraph(" ".join((*said, _BRACKETS)))
 

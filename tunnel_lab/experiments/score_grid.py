@@ -78,7 +78,7 @@ class CampaignsTable(_RecordsTable):
     effects: list[OneLine] = Field(
         default=[NO_EFFECT],
         min_length=1,
-        description='a list such as ["none", "coulomb_friction:friction_moment=0.004"], those that act at once '
+        description='a list such as ["none", "coulomb_friction:friction_moment=0.004"], effects that act at once '
         "joined by ' + '",
     )
 

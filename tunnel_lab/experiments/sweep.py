@@ -203,5 +203,5 @@ def stored_sweep(folder: Path) -> Sweep:
 
 
 def open_store(folder: Path) -> Parts[int]:
-    """The results in the folder of a sweep; errors as of `stored_sweep`."""
+    """The results in the folder of a sweep; errors as in `stored_sweep`."""
     return Parts(folder, stored_sweep(folder).experiment)

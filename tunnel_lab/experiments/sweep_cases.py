@@ -33,7 +33,7 @@ class SweepCase:
         replicate: number of the repetition with other noise, from 0.
         duration: of every run, s.
         plan: the campaign with its seed.
-        document: the same as a campaign description, ready to be written as TOML.
+        document: the case as a campaign description, ready to be written as TOML.
     """
 
     index: int
@@ -123,7 +123,7 @@ class SweepCases:
             "truth": truth,
             "effects": effects,
         }
-        if scatter:  # without scatter, contents and seed must equal those of a file without the table
+        if scatter:  # without scatter, contents and seed must be the same as for a file without the table
             physics["scatter"] = scatter
         # The seed, from 0 to 2⁶³ − 1, depends on the contents of the case, not on its place in the product.
         contents = json.dumps({"rig": self.rigs[rig], **physics}, sort_keys=True, allow_nan=False)

@@ -1,4 +1,4 @@
-"""The tables of a sweep file: those of a campaign description with lists of values; their sizes and limits."""
+"""The tables of a sweep file: a campaign description's with lists of values; their sizes and limits."""
 
 from __future__ import annotations
 

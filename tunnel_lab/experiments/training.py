@@ -41,7 +41,7 @@ from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.record import Array
 
 FALSE_ALARMS = 0.01
-"""Share of calibration samples, like those of the training, that are called unlike them."""
+"""Share of calibration samples that are called unlike the training, although they are like it."""
 _KEPT_EVERY = 250  # steps between checkpoints
 _SHRINK = 0.05  # shrinkage of the context's covariance towards its mean variance
 Progress = Callable[[str, int, int], None]
@@ -204,7 +204,7 @@ class State:
 
 
 def usable(samples: Mapping[str, Array]) -> dict[str, Array]:
-    """The samples, except those with targets very far from the nominal fit."""
+    """The samples, without targets very far from the nominal fit."""
     if not all(np.all(np.isfinite(values)) for values in samples.values()):
         raise ValueError("internal error: a training sample is not finite")
     near = np.abs(samples["target"]).max(axis=1) < FAR

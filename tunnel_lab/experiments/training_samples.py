@@ -345,7 +345,7 @@ def motions_of(draws: Sequence[CampaignDraw], substeps: int) -> list[RodMotion]:
 
 
 def flexible_motion(c: TrueConditions) -> RodMotion:
-    """The upper end of a linear rod, by the modes of its four states."""
+    """Motion of the upper end of a linear flexible rod, from the modes of its four states."""
     angle = np.empty((c.samples, c.runs))
     rate = np.empty_like(angle)
     time = np.arange(c.samples) / c.sample_rate

@@ -195,7 +195,7 @@ def table_4(_: Path) -> PaperSection:
             "tested is how close both methods come to a known truth.",
             "Rows from the paper are in 1/rad. The others are errors of Cnβ and Cnr against the truth, "
             "which is the network's row, and the misfit of the regenerated response over the release "
-            "angle. The runs are those of the virtual rig; one seed each.",
+            "angle. The runs are the virtual rig's; one seed each.",
         ),
         headings=("", "Cnβ", "Cnr", "response"),
         rows=(*printed, again, *ours),

@@ -109,7 +109,7 @@ def table_2(folder: Path) -> PaperSection:
             "that Kr is plotted against ωn; the gradient is an inertia only against ωn².",
             f"Springs beyond chance off the line: {odd or 'none'}. No inertia moves one spring and not the "
             "next, so their stiffness or frequency is wrong, or they are of another kind. The virtual rig "
-            "takes the stiffnesses as stated; its frequencies are those of one inertia and differ from "
+            "takes the stiffnesses as stated; its frequencies follow from one inertia and differ from "
             "the paper's by as much.",
         ),
         headings=(

@@ -116,7 +116,7 @@ def draw(answer: Findings, what: str, runs: Sequence[str] = ()) -> Drawing:
 
     Args:
         what: name of the figure, as in `Findings.pictures`.
-        runs: ids of the runs for ``fit``; two of them are drawn. Empty: those with the largest gap.
+        runs: ids of the runs for ``fit``; two of them are drawn. Empty: the runs with the largest gap.
 
     Raises:
         TunnelError: for a figure or a run that the diagnosis does not have.
@@ -158,7 +158,7 @@ def _resource(name: str) -> str:
 
 
 def diagnosis_figures(answer: Findings) -> dict[str, Drawing]:
-    """All figures of a diagnosis by name, in the order of the report; those of ``maps`` only where present."""
+    """All figures of a diagnosis by name, in the order of the report; ``maps`` only where present."""
     return {name: drawn for name, one in answer.pictures.items() if (drawn := one.draw()) is not None}
 
 

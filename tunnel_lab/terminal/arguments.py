@@ -130,7 +130,7 @@ EffectsFileOption = Annotated[
         "--effects-file",
         metavar="FILE.toml",
         rich_help_panel="Effects",
-        help="Add the effects that this file states as expressions to those that are tried.",
+        help="Also try the effects that this file states as expressions.",
         callback=_know_effects,
     ),
 ]

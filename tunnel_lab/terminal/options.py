@@ -1,4 +1,4 @@
-"""The options of a command, made from the types of its arguments, and those that every command has."""
+"""The options of a command, made from the types of its arguments, and options of every command."""
 
 from __future__ import annotations
 

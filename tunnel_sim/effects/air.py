@@ -303,8 +303,8 @@ class WindSpeedDrift(Effect):
     example = (0.1,)
     autonomous = False
     caveat = (
-        "The stated wind speed counts as that at the release. The uncertainty of Cnβ includes that it may be the "
-        "mean over the run."
+        "The stated wind speed counts as the speed at the release. The uncertainty of Cnβ includes that it may be "
+        "the mean over the run."
     )
 
     drift: float = parameter(
@@ -313,7 +313,7 @@ class WindSpeedDrift(Effect):
     settling: float = settling()
 
     def unseen_form(self, cn_beta: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
-        """Runs cannot show whether the stated speed is that at the release or the mean over the run.
+        """Runs cannot show whether the stated speed holds at the release or is the mean over the run.
 
         The truth may be between the two cases; their difference is a rectangular half-width.
         """

@@ -1,4 +1,4 @@
-"""What an effect can do beyond a term of the moment law: each capability is a type, and an effect may have two.
+"""Capabilities of effects beyond a term of the moment law: each is a type, and an effect may have two.
 
 A hook stands on the type that has it, so an effect without the capability is never asked.
 """

@@ -151,7 +151,7 @@ def with_effects(
     """The physics of runs with their effects; a spring with a moving root acts with its true stiffness.
 
     Args:
-        effects: of every run, in the order in which they act; those of the runs are of the same classes.
+        effects: of every run, in the order in which they act; all runs have the same classes.
         drawn: the random part of each effect, by run.
         deviations: as in `EffectChain`, by run.
     """

@@ -28,7 +28,7 @@ CONTACT = {
     "friction_peak_rate": "peak_rate",
     "friction_load": "load",
 }
-#: Terms of the moment law, each of which makes friction depend on the rate.
+#: Terms of the moment law; each makes friction depend on the rate.
 AGAINST_RATE = ("friction_exponent", "friction_saturation", "friction_peak")
 
 
@@ -44,7 +44,7 @@ class CoulombFriction(Friction):
     peak near rest (Armstrong-Hélouvry et al. 1994). All of them leave the friction less than proportional to the
     rate, which separates the family from damping.
 
-    In a joint, friction grows with the moment carried (Hamon, Gautier & Garrec 2011): gravity's or that of
+    In a joint, friction grows with the moment carried (Hamon, Gautier & Garrec 2011): gravity's or the moment of
     an actuator, whichever is greater, since they act on the two sides of the joint. The moment of a spring does not
     count: friction proportional to it is structural damping.
     """

@@ -47,9 +47,9 @@ class Traits:
     - ``turns``: the parameter that changes its sign if angles are counted from half a turn away; empty: none.
     - ``tries``: how many starting points of a fit are worth trying.
     - ``size``: its size in plain words, with the names of parameters in braces; empty: they are listed.
-    - ``advice``: what to do about it, a clause without its full stop; empty for a user's effect. The name of
+    - ``advice``: the remedy, a clause without its full stop; empty for a user's effect. The name of
       a parameter in braces stands for its value.
-    - ``advice_for_joint``: the same for the joint of a machine, where it differs.
+    - ``advice_for_joint``: the remedy for the joint of a machine, where it differs.
     - ``caveat``: how to read the coefficients that are reported with it.
     - ``undetected``: how to read them where it is not named, with ``{size}`` and ``{changes}`` at its upper
       limit; a clause without its full stop.

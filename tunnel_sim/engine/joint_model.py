@@ -288,7 +288,7 @@ def _law(model: mujoco.MjModel, recorded: Recorded, *, slide: bool) -> JointLaw:
         restoring = np.array([-engine.moment(rest + x) for x in b])
         terms = _fitted(_MOMENTS, {"b": b}, restoring, float(np.max(np.abs(restoring))))
     if terms is None:
-        what = "its restoring moment is not that of gravity and of springs up to the third power"
+        what = "its restoring moment comes not only from gravity and springs up to the third power"
         raise TunnelError(
             what, remedy="write tendons, dead bands and actuators as the stiffness of the joint"
         )
@@ -340,7 +340,7 @@ def _law(model: mujoco.MjModel, recorded: Recorded, *, slide: bool) -> JointLaw:
 def _fitted(
     forms: Sequence[tuple[str, str]], moving: dict[str, Array], wanted: Array, scale: float
 ) -> dict[str, float] | None:
-    """Coefficients by expression, without those that are rounding; None where the forms do not fit the moment.
+    """Coefficients by expression, without mere rounding; None where the forms do not fit the moment.
 
     Rounding is judged against the moment ``scale`` (N m). The linear term includes the slope of the sine at rest,
     so that it is the whole slope.

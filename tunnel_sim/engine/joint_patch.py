@@ -137,7 +137,7 @@ def inertia_of_steps(model: mujoco.MjModel, damping: float) -> float:
     middle: this adds C h/2 to the inertia, or subtracts it.
 
     Args:
-        damping: of the joint, added to that of the model, N m s/rad.
+        damping: of the joint, added to the model's, N m s/rad.
     """
     options, kinds = model.opt, mujoco.mjtIntegrator
     damping = float(model.dof_damping[0]) + damping

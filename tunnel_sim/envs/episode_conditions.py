@@ -64,7 +64,7 @@ class FreeDecayConfig:
         wind_time_constant: of the tunnel's first-order response to its set-point, s.
         moment_limit: greatest moment that the operator can apply, N m.
         effect_probability: probability that an episode draws an effect, if its options do not name effects.
-        stop_penalty: what a run loses at the stop, besides its information, nats. By default as much as two
+        stop_penalty: loss of a run at the stop, besides its information, nats. By default as much as two
             standard deviations smaller by a factor of e⁵ together, more than a run usually adds by control.
         prior: changes to `Prior` by name, in its units.
     """

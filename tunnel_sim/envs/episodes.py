@@ -1,6 +1,6 @@
 """Parallel episodes: readings, information, end, and the resulting campaign; a vector environment has many.
 
-Readings are bit-identical to those of `tunnel_sim.effects.chain.read_motion`: zero, noise and quantisation are
+Readings are bit-identical to `tunnel_sim.effects.chain.read_motion`: zero, noise and quantisation are
 vectorised, effects act run by run.
 """
 

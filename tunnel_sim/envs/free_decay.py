@@ -214,7 +214,7 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
         return observation, self._add_info(infos, info, row)
 
     def step(self, actions: Any) -> tuple[Array, Array, Any, Any, dict[str, Any]]:
-        """Advance all runs as `FreeDecayEnv.step` does, or restart those that ended in the previous step."""
+        """Advance all runs as `FreeDecayEnv.step` does, or restart runs that ended in the previous step."""
         if any(rng is None for rng in self._rngs):
             raise EnvError("no run is in progress", where="step", remedy="call reset() first")
         renewed = np.flatnonzero(self._episodes.ended)

@@ -105,8 +105,8 @@ class _Step:
             shape (runs, 4, 4).
         push: kicks by a unit moment, shape (runs, 2 samples).
         shares: of the sensitivities in the three kinds of kicks, shape (runs, 3, DYNAMIC).
-        response: to the sensitivities at the samples and the end, and their rate at the end, from those at the
-            start, their rates, and the kicks, shape (runs, samples + 2, 2 samples + 2).
+        response: to the sensitivities at the samples and the end, and their rate at the end, from the sensitivities
+            at the start, their rates, and the kicks, shape (runs, samples + 2, 2 samples + 2).
     """
 
     sums: Array

@@ -67,6 +67,6 @@ def refuse_records(path: Path) -> None:
 
 
 def _may_be_record(path: Path) -> bool:
-    """Whether the ending of a file is one of those that the import reads."""
+    """Whether the import reads files of this ending."""
     ending = path.suffix.lower()
     return ending in _TEXT or reader_place(ending) is not None

@@ -179,7 +179,7 @@ def _stated(values: dict[str, Any]) -> dict[str, Any]:
 TRUTH_FILE = "truth.json"
 RUN_FOLDER = "runs"
 IMPORT_RECIPE, IMPORT_PICTURE = "import.toml", "import.png"
-"""What an import keeps beside the campaign."""
+"""Files that an import keeps beside the campaign."""
 
 
 def read_campaign(folder: Path | str, progress: Callable[[int, int], None] | None = None) -> Campaign:
@@ -280,7 +280,7 @@ def write_campaign(
     """Write a campaign so that reading it gives the same numbers: completely, or not at all.
 
     Args:
-        campaign: what to write; it must pass every check of the reader.
+        campaign: must pass every check of the reader.
         folder: the folder to create, with its parents where they are missing.
         run_format: ``parquet`` or ``csv``.
         truth: the simulated truth, written as ``truth.json``; None: no such file.

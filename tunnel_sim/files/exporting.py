@@ -99,7 +99,7 @@ def _record(campaign: Campaign, run: Run) -> dict[str, Any]:
 
 
 def _conditions(run: Run) -> dict[str, float | str]:
-    """The stated conditions of a run by key; for a driven run also those of its input."""
+    """The stated conditions of a run by key; for a driven run also its input's."""
     stated: dict[str, float | str | None] = {key: getattr(run, key) for key in RUN_KEYS}
     if run.drive is not None:
         stated |= run.drive.stated

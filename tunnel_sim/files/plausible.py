@@ -94,7 +94,7 @@ RANGES: Mapping[str, Range] = {
     ),
     "period": Range(
         1e-3, 100.0, "s", "milliseconds", "minutes or hours",
-        "a period of minutes is that of a ship, a frequency above 1 kHz that of a tuning fork",
+        "a period of minutes suits a ship, a frequency above 1 kHz a tuning fork",
     ),
 }  # fmt: skip
 """By key of ``campaign.toml``; ``swing``, ``step`` and ``period`` are half the span of a run's angle, its mean time
@@ -173,7 +173,7 @@ def checked_record(
 
 
 def _spoilt(record: Record) -> tuple[str, str] | None:
-    """What hides an oscillation, and the remedy: a jump of the clock, or a value that stands for a missing one.
+    """The reason why an oscillation is hidden, and the remedy: a jump of the clock, or a code for a missing value.
 
     Whether it does is tried: without it the record has three cycles.
     """

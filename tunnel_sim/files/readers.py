@@ -25,7 +25,7 @@ class FileTable:
     """The table of a run file: at least its columns of times, readings and input.
 
     Args:
-        names: of all columns of the file, including those that are not in the frame.
+        names: of all columns of the file, also of columns that are not in the frame.
         text: whether its cells are texts, below a line of headings.
     """
 

@@ -303,7 +303,7 @@ def as_described(what: str, where: str, remedy: str) -> Iterator[None]:
 
 
 def _reason(error: Exception) -> str:
-    """What a parser says of its input; of a value against its type, the key and what it should be."""
+    """A parser's message about its input; for a value of a wrong type, the key and the right type."""
     from pydantic import ValidationError  # slow to load; needed for faults only
 
     if isinstance(error, ValidationError):

@@ -55,7 +55,7 @@ _LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{limits.
 
 
 def load_toml(path: Path, *, missing: str) -> dict[str, Any]:
-    """Read a TOML file, not yet validated, whose numbers do not overflow; ``missing`` is the remedy without it."""
+    """Read a TOML file, not yet validated; refuse numbers that overflow; ``missing``: remedy for a missing file."""
     where = shown(path)
     text = read_text(path, limits.DOCUMENT_BYTES, missing=missing)
     if not text.strip():

@@ -240,7 +240,7 @@ class ActuatorLimits:
 
 
 DIRECT = ActuatorLimits()
-"""What exerts every moment as asked for."""
+"""An ideal actuator, which exerts every moment as asked for."""
 
 
 def _shortest(time: Array, width: Array) -> Array:

@@ -48,7 +48,7 @@ class Response:
 
 @dataclass(frozen=True, eq=False)
 class Ringing:
-    """What the rod adds to the slow motion of its upper end: Re(amplitude · exp(root · t)) and responses, rad.
+    """The rod's contribution to the slow motion of its upper end: Re(amplitude · exp(root · t)) and responses, rad.
 
     Args:
         amplitude: of the ringing after the release, rad.
@@ -101,7 +101,7 @@ class SlowMotion:
     ringing: Ringing
 
     def forward_run(self) -> tuple[NDArray[np.void], Sequence[Array]]:
-        """The run for the compiled integrator; result as of `forward_run`."""
+        """The run for the compiled integrator; result as from `forward_run`."""
         row, keep_alive = forward_run(self.run)
         row["lead"], row["rod_stiffness"], row["lagged"] = self.lead, self.rod_stiffness, self.body_release
         return row, keep_alive

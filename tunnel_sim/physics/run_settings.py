@@ -250,7 +250,7 @@ class SettingsTable:
         """Change the inputs of the driven runs; equal changes of one input give one object.
 
         Args:
-            by: what changes the input of every run.
+            by: the change of the input of every run.
             changed: the input after a change.
         """
         known: dict[tuple[Hashable, InputMoment], InputMoment] = {}
@@ -286,7 +286,7 @@ class _Number(_Field):
 
 
 class _Object(_Field, Generic[_Value]):
-    """What is not a number; None: as in an empty table."""
+    """A field that is not a number; None: as in an empty table."""
 
     def __get__(self, run: RunSettings | None, owner: type) -> _Value:
         value: _Value = cast(Any, None) if run is None else getattr(run.table, self.name)[0]

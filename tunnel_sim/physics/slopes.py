@@ -50,7 +50,7 @@ class Slopes:
             not exist; or of the weighted sums, shape (n, columns, samples − 1). Along changes of samples they are
             last.
         by_rate: derivatives of the rate, of that shape; none for weighted sums.
-        status: as of `integrate`, or −1 where a run has none.
+        status: as from `integrate`, or −1 where a run has none.
     """
 
     angle: Array

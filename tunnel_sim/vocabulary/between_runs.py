@@ -16,10 +16,10 @@ USUAL_SCATTER: Mapping[str, float] = {
     "spring_stiffness": 0.0005,  # a spring clamped again repeats to some hundredths of a per cent
     "mechanical_damping": 0.01,  # bearings and cables repeat to a per cent
 }
-"""What may differ between runs, and by how much it does in a usual rig: one standard deviation, relative."""
+"""Numbers that may differ between runs, with the usual standard deviation in a rig, relative."""
 
 SCATTERED = tuple(USUAL_SCATTER)
-"""Those numbers, in the order of a campaign's ``[repeatability]``."""
+"""These numbers, in the order of a campaign's ``[repeatability]``."""
 
 WIDEST_SCATTER = 0.2
 """Greatest standard deviation between runs, relative: a deviation that reverses the sign has five of them."""

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 Quantity = Literal["angle", "rate", "acceleration"]
-"""What a sensor measures: the yaw angle, or its first or second derivative."""
+"""Quantities of a sensor: the yaw angle, or its first or second derivative."""
 
 Zero = Literal["common", "per_run", "auto"]
 """Whether the runs have one zero, one each, or whether the records decide."""
@@ -28,7 +28,7 @@ Zero = Literal["common", "per_run", "auto"]
 
 @dataclass(frozen=True)
 class RigProperties:
-    """What a campaign states about its rig; None where nothing is stated.
+    """A campaign's statements about its rig; None where nothing is stated.
 
     Args:
         yaw_inertia: nominal Izz of model and support, kg m².
@@ -51,7 +51,7 @@ class RigProperties:
 
 @dataclass(frozen=True)
 class SensorProperties:
-    """What a campaign states about its sensor; None where nothing is stated.
+    """A campaign's statements about its sensor; None where nothing is stated.
 
     Args:
         sample_rate: Hz.

@@ -308,7 +308,7 @@ def _plain(unit: str) -> str:
 
 
 KINDS: tuple[InputKind, ...] = (Moment(), Unscaled(), Root(), Command(), BaseRotation(), BaseTranslation())
-"""In the order in which they are asked whether a column is theirs; what none claims is an input of any unit."""
+"""In the order in which they may claim a column; an unclaimed column is an input of any unit."""
 
 INPUTS: Mapping[InputColumn, InputKind] = {kind.column: kind for kind in KINDS}
 """The kinds of input by their columns."""

@@ -17,7 +17,7 @@ Judgement."""
 
 
 class Rival:
-    """A possible cause that is not an effect of the vocabulary: its probability is added to that of ``unknown``."""
+    """A possible cause that is not an effect of the vocabulary: its probability is added to ``unknown``."""
 
     def hypotheses(
         self, likely: Sequence[Hypothesis], known: Sequence[Hypothesis], nominal: Fit

@@ -3,7 +3,7 @@
 Every effect that changes the frequency with the spring has one parameter for it, and the inertia is another, so
 two such effects fit any frequencies of three springs. Two springs off are as simple (paper, Table II: springs 4
 and 7), and are not an effect of the vocabulary. They are weighed like a set of it; their probability is added to
-that of an unknown cause.
+the probability of an unknown cause.
 """
 
 from __future__ import annotations

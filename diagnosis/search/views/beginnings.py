@@ -115,7 +115,7 @@ class Beginnings(WholeRuns):
     def settled(self, hypothesis: Hypothesis) -> Hypothesis | None:
         """The set fitted to whole runs, with its forms of the beginnings and in the deepest minimum of these.
 
-        The covariance of other minima is that of the beginnings, too. Whole runs exclude more of them.
+        The covariance of other minima comes from the beginnings, too. Whole runs exclude more of them.
         """
         begun = polish(hypothesis)
         whole, spread = self.whole(begun), begun.fit.spread
@@ -142,7 +142,7 @@ class AfterBeginnings(View):
 
     @classmethod
     def after(cls, prepared: Prepared, known: Sets | None, clock: StepClock) -> Self | None:
-        """The view after that of the beginnings, where their answer holds in whole runs."""
+        """The view after the beginnings, where their answer holds in whole runs."""
         del prepared, clock
         if known is None or not isinstance(known.view, Beginnings):
             return None

@@ -39,7 +39,7 @@ class ByMoment(View):
     """Whole runs whose noise includes a random moment.
 
     Every small error of the moment displaces such a body permanently, so its angle departs ever further. The
-    residual random moment therefore counts as noise: that of the likeliest set whose moment is small beside the
+    residual random moment therefore counts as noise: the moment of the likeliest set that is small beside the
     moment missing from the nominal model.
 
     Args:

@@ -41,7 +41,7 @@ six of 14 campaigns with a cause outside the vocabulary it exceeds 0.4. These ca
 test."""
 NEARLY_EXPLAINED: Final = 0.2
 """Maximum unexplained share of the gap within runs for the forms of a set beside scatter to be freed.
-Judgement. The effect of another form of a cause differs from that of the textbook form by less than 45 %. In
+Judgement. The effect of another form of a cause differs from the textbook form's by less than 45 %. In
 two simulated campaigns of three and four causes, free forms did not improve sets with an unexplained share of
 0.26 to 0.81."""
 GROWN_BESIDE: Final = 0.2
@@ -59,7 +59,7 @@ class WholeRuns(View):
 
     Args:
         first: the set that all others contain; None: the empty set.
-        unscattered: the nominal fit with runs that repeat exactly, where those of the base do not.
+        unscattered: the nominal fit with runs that repeat exactly, where the base's runs do not.
         known: the likely sets of another view, beside which the runs differ.
     """
 

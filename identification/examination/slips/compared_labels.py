@@ -2,7 +2,7 @@
 
 Every run obeys Kr = Izz ωn² + Ka with a common Izz and with Ka proportional to ½ρV². The runs of one spring lie
 on a straight line of ωn² against ½ρV², whatever the error of the spring. If the statements contradict the
-frequencies beyond chance, and agree after exchanging those of two runs, they were exchanged.
+frequencies beyond chance, and agree after an exchange of two runs' labels, these were exchanged.
 
 The stated springs agree where Kr/ωn² with the wind off is the same inertia for all, and equals the stated one.
 """
@@ -78,7 +78,7 @@ class LabelsExchanged(StatementSlip):
     """Springs or wind speeds of two runs, or of all runs of two settings, are exchanged. Refused."""
 
     def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
-        """Exchange the labels of runs that fit badly with those of all others."""
+        """Exchange the labels of runs that fit badly with all others' labels."""
         known = [swing for swing in seen.swings if swing.run.spring_stiffness is not None]
         if len(known) < _LEAST_RUNS:
             return ()
@@ -175,7 +175,7 @@ def _misfit(labels: Labels, what: str) -> tuple[_Misfit, Array]:
 
 
 def _exchanged(labels: Labels, away: Array, what: str) -> Iterator[tuple[tuple[int, ...], Labels]]:
-    """The statements of two runs, one of which fits badly, exchanged, and those of all runs of two settings."""
+    """Statements exchanged between two runs, if one fits badly, or between all runs of two settings."""
     worst: NDArray[np.intp] = np.argsort(-away)[:_CANDIDATES]
     pairs = sorted({(min(i, j), max(i, j)) for i in worst.tolist() for j in range(away.size) if i != j})
     values = labels.spring if what == _SPRINGS else labels.pressure
@@ -375,7 +375,7 @@ class InertiaOffTheSprings(StatementSlip):
     """A stated inertia that the springs contradict. Noted."""
 
     def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
-        """Compare the stated inertia with that of the wind-off springs; a nominal inertia may be off a little.
+        """Compare the stated inertia with the wind-off runs'; a nominal inertia may be off a little.
 
         The remark names the probable error of units; there is none where the campaign states ``plausible = false``.
         """

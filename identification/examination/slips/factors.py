@@ -1,7 +1,7 @@
 """One factor on the statements of a run, or of a group of runs, with which frequency and damping of all runs agree.
 
 The air's part of k grows as ρV² and of a as ρV, and a wrong clock changes both of them wholly, so that the kinds of
-factors are told apart. What an effect does to all runs of one wind speed alike is not a slip.
+factors are told apart. An effect on all runs of one wind speed alike is not a slip.
 """
 
 from __future__ import annotations

@@ -204,7 +204,7 @@ class CoupledSensor(StatementSlip):
     """
 
     def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
-        """Fit a decaying centre to every free decay of an angle; most of those that have one must agree."""
+        """Fit a decaying centre to every free decay of an angle; most runs that have one must agree."""
         if seen.campaign.sensor.derivative or not seen.swings:
             return ()
         decaying = [one for swing in seen.swings if (one := _decaying(swing)) is not None]

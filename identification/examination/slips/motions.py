@@ -29,7 +29,7 @@ _TINY = 1e-300
 
 @dataclass(frozen=True, eq=False)
 class RunConditions:
-    """Stated conditions of the runs, or those that a trial puts in their place; each array of shape (n,).
+    """Stated conditions of the runs, or a trial's conditions in their place; each array of shape (n,).
 
     Args:
         spring: factor on the stated stiffness.

@@ -1,4 +1,4 @@
-"""The sensor of some runs differs from that of the others: gain, noise or bandwidth, sign, or unit of the angle."""
+"""The sensor of some runs differs from the others': gain, noise or bandwidth, sign, or unit of the angle."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class OtherGain:
 
 @dataclass(frozen=True)
 class OddGain(StatementSlip):
-    """Noise and swing of one run are those of the others times one factor. Named: ωn and ζ do not change.
+    """Noise and swing of one run are the others' times one factor. Named: ωn and ζ do not change.
 
     In a linear decay a gain, such as another range of the amplifier, looks like another release. But it scales the
     noise of the sensor by the same factor as the swing, and a release does not.
@@ -200,7 +200,7 @@ def _less(swing: Swing, first: float, ratio: float) -> Remark:
 
     Args:
         first: lower end of the lowest such band, Hz.
-        ratio: logarithm of the least ratio of the noise to that of the others.
+        ratio: logarithm of the least ratio of the noise to another run's.
     """
     what = (
         f"above {first:.2g} Hz its noise is 1/{significant(np.exp(-ratio), 2)} of that of every other run: the "
@@ -246,14 +246,14 @@ class MirroredRun(StatementSlip):
     """
 
     def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
-        """Compare the zeros of all runs with those of some signs inverted."""
+        """Compare the zeros of all runs as stated and with some signs inverted."""
         swings = seen.swings
         if len(swings) < _FEWEST_SIDES or seen.stated.sensor.zero == "per_run":
             return ()
         zeros = np.array([swing.zero for swing in swings])
         std = np.array([max(swing.zero_std, 1e-300) for swing in swings])
         size = float(np.median(np.abs(zeros)))
-        # the runs that differ; if half of all, those that begin on the less usual side
+        # the runs that differ; if half of all, the runs that begin on the less usual side
         minus = zeros < 0.0
         odd = minus if 2 * minus.sum() < zeros.size else ~minus
         if not odd.any() or odd.all():
@@ -332,7 +332,7 @@ _SUSPICIOUS = 10.0  # ratio to the amplitudes of other runs, from which the nois
 
 @dataclass(frozen=True)
 class AngleInDegrees(StatementSlip):
-    """Amplitude and noise of some runs are 57.3 times those of the others, or 1/57.3 of them. Refused.
+    """Amplitude and noise of some runs are 57.3 times the others', or 1/57.3 of them. Refused.
 
     The fewer runs are the wrong ones. Of as many large as small ones either may be wrong.
     """

@@ -20,14 +20,14 @@ from identification.examination.slips.fits import Statements, agreement
 from identification.status import Outcome, Remark
 
 Key = Literal["spring", "speed", "density", "clock"]
-#: Names of the labels, and the units of those that are numbers of their own.
+#: Names of the labels, and units where a label is a number of its own.
 _NAMES: Mapping[Key, str] = {
     "spring": "spring_stiffness", "speed": "wind_speed", "density": "air_density", "clock": "time_s",
 }  # fmt: skip
 _UNITS: Mapping[Key, str] = {"spring": "N m/rad", "speed": "m/s", "density": "kg/m3"}
 _FEWEST = 3  # runs: two determine g and n
-_MOST_SUSPECTS = 12  # runs that agree worst, whose labels are tried
-_MOST_PAIRED = 40  # runs, all of whose pairs with a suspect are tried
+_MOST_SUSPECTS = 12  # number of the runs that agree worst; their labels are tried
+_MOST_PAIRED = 40  # number of runs up to which all pairs with a suspect are tried
 _MOST_SAID = 3
 _TIE = 1.0  # squared tolerances: slips that agree about equally well are all named
 _DECIMAL = {

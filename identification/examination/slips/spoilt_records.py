@@ -173,7 +173,7 @@ _NOISE = 5.0  # or within as many standard deviations of its last fiftieth
 _LEAST_CYCLES = (
     0.75  # of standing: at a turning point a swing stays within a hundredth for a twentieth of a cycle
 )
-_LEAST_KEPT = 2.0  # cycles of motion before it, whose last swings are compared
+_LEAST_KEPT = 2.0  # cycles of motion before it; their last swings are compared
 #: Dry friction reduces every swing by the same step and stops the body from a swing of at most one such step;
 #: viscous damping reduces it by a share. A swing of more than three steps does not stop by itself.
 _STEPS = 3.0
@@ -287,7 +287,7 @@ _LEAST = 500  # differences in common: the best correlation of pure noise over a
 _SAME = 0.7
 _ALONE = 0.5  # of the correlation: greatest at any other shift; hum common to two runs exceeds it
 _NEAR = 12  # shifts about the best that the differencing itself correlates
-_THINNED = (2, 3, 4)  # samples of which one is kept
+_THINNED = (2, 3, 4)  # of this many samples one is kept
 _SAME_RATE = 1e-3
 _MOST_PAIRS = 1500  # half a second of comparisons
 _ROUNDING = 1e-9  # of the largest reading: smaller differences are rounding errors

@@ -232,7 +232,7 @@ class InertiaOfNoBody(StatementSlip):
     """
 
     def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
-        """Compare 12 Izz/(A l³), the density of a uniform rod of these sizes, with those of bodies."""
+        """Compare 12 Izz/(A l³), the density of a uniform rod of these sizes, with the densities of bodies."""
         area, length = seen.campaign.rig.frontal_area, seen.campaign.rig.reference_length
         still = [s for s in seen.swings if s.run.spring_stiffness and not s.run.wind_on]
         stated = seen.campaign.rig.yaw_inertia is not None

@@ -139,11 +139,11 @@ class Case:
         withheld: whether one of its effects was excluded from the vocabulary, which makes the truth unknown.
         severity: excess of the nominal model as a ratio to the noise variance; None where the truth does not state
             it.
-        coefficients: true ``cn_beta`` and ``cn_r``, 1/rad; those in phase with angle and rate where a lag of the
+        coefficients: true ``cn_beta`` and ``cn_r``, 1/rad; in phase with angle and rate where a lag of the
             air acts that the answer does not name (decision 0004).
         answer: the scored part of the diagnosis.
         small: effects that act but need not be found, sorted.
-        time_scale: time over that of the standard rig, a ratio.
+        time_scale: time over the standard rig's, a ratio.
         few_runs: whether the protocol has few springs and speeds.
         coloured: whether the sensor's noise is coloured.
         stamps: ``even``, ``rounded`` or ``jittered``.

@@ -45,11 +45,11 @@ class ScatterScore:
 
     Args:
         by_number: for each quantity, then for all together.
-        named_alone: of campaigns without a cause and with unstated scatter: those with scatter and no cause named.
-        no_gap: of campaigns without a cause and with scatter as stated: those in which nothing is named.
-        false_alarms: of campaigns whose runs repeat: those with scatter named.
-        exact: of campaigns whose runs scatter: those whose causes are exactly right; scatter may be named.
-        exact_repeating: of campaigns whose runs repeat: those whose causes are exactly right.
+        named_alone: scatter and no cause named, of campaigns without a cause and with unstated scatter.
+        no_gap: nothing named, of campaigns without a cause and with scatter as stated.
+        false_alarms: scatter named, of campaigns with runs that repeat.
+        exact: causes exactly right, of campaigns with runs that scatter; scatter may be named.
+        exact_repeating: causes exactly right, of campaigns with runs that repeat.
     """
 
     by_number: tuple[FoundScatter, ...]
@@ -62,7 +62,7 @@ class ScatterScore:
     SHARES = ("named_alone", "no_gap", "false_alarms", "exact", "exact_repeating")
 
     def to_json_dict(self) -> dict[str, Any]:
-        """The shares by name, and those of the quantities."""
+        """The shares by name, and by quantity."""
         shares: dict[str, Any] = {name: getattr(self, name).to_json_dict() for name in self.SHARES}
         return shares | {"by_number": {one.number: one.to_json_dict() for one in self.by_number}}
 

@@ -56,7 +56,7 @@ class ScoreSection(TextTable):
 
 
 def sections(score: BlindScore) -> list[ScoreSection]:
-    """The sections of a score, in order; those without rows are left out."""
+    """The sections of a score, in order, without empty ones."""
     return [one for one in (*_answer_sections(score), *_other_sections(score)) if one.rows]
 
 

@@ -1,4 +1,4 @@
-"""What a user states about files before an import, as options or in ``import.toml``: how each step decides."""
+"""The user's statements about files before an import, as options or in ``import.toml``: how each step decides."""
 
 from __future__ import annotations
 
@@ -192,7 +192,7 @@ def _factor(key: str, unit: str, where: str) -> float:
 
 
 def parse_times(words: Sequence[str], option: str) -> dict[str, float]:
-    """Times in s by run, under the empty name that of all files, from words ``SECONDS`` or ``RUN=SECONDS``.
+    """Times in s by run, under the empty name for all files, from words ``SECONDS`` or ``RUN=SECONDS``.
 
     Raises:
         TunnelError: for a word of another form.

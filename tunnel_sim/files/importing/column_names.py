@@ -1,4 +1,4 @@
-"""What the names of columns say: times, angles, rates, the number of a run; and the columns that a user names."""
+"""The meaning of column names: times, angles, rates, the number of a run; and the columns that a user names."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ _VOLTAGE = re.compile(
 
 
 def names_voltage(name: str) -> bool:
-    """Whether a name is that of a voltage, or of a channel of a converter or an oscilloscope."""
+    """Whether a name means a voltage, or a channel of a converter or an oscilloscope."""
     return _VOLTAGE.fullmatch(_JOINED.sub("_", name)) is not None
 
 

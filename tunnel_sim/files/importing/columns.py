@@ -48,7 +48,7 @@ _STEADY = 0.5  # of the usual step: the steps of a clock differ by less
 _JUDGED = 200_000  # samples of a column that is not used, for its effect on the angle
 _MOST_JUDGED = 8  # columns
 _LEAST_JUDGED = 16  # samples
-_UNNAMED = 4  # of the levels of `_likeliest`: neither name nor unit is that of an angle
+_UNNAMED = 4  # of the levels of `_likeliest`: neither name nor unit is an angle's
 _HARDLY = 0.02  # of the span of another column in the same unit
 _DERIVATIVE = 0.9  # correlation with the derivative of another column, from which a column is its rate
 
@@ -77,7 +77,7 @@ class RunColumns:
 
 
 class Unread(TunnelError):
-    """What is to be stated of the columns of a run: units, a rate, or which of several is meant."""
+    """Open questions about the columns of a run: units, a rate, or which of several is meant."""
 
     def __init__(self, fault: TunnelError, columns: RunColumns) -> None:
         super().__init__(
@@ -100,7 +100,7 @@ def find_columns(
     except Unread as fault:  # the first of several columns that may be the angle, and what it asks for
         several, runs = [fault], [fault.columns]
     found = [_as_numbers(table, run, choices, calibration, where, several) for run in runs]
-    if len(found) == 1:  # beside several runs, other columns are those of other runs
+    if len(found) == 1:  # beside several runs, other columns belong to other runs
         found = [replace(found[0], said=(*found[0].said, *_unused(table, found[0], choices)))]
     return found
 
@@ -113,7 +113,7 @@ def _as_numbers(
     where: str,
     asked: Sequence[TunnelError],
 ) -> RunColumns:
-    """The columns of a run in seconds and radians, and its input; ``asked``: what is to be stated already."""
+    """The columns of a run in seconds and radians, and its input; ``asked``: questions that are open already."""
     faults = [*asked]
     clock, channel = run.time.channel, run.reading.channel
     rows, facts = channel.values.size, table.facts
@@ -136,7 +136,7 @@ def _as_numbers(
 
 
 def _unused(table: Table, columns: RunColumns, choices: ImportChoices) -> list[str]:
-    """The columns that are not used, and those of them that move before or with the reading."""
+    """The unused columns, and which of them move before or with the reading."""
     named_before = " ".join(columns.said)
     others = [
         channel
@@ -173,7 +173,7 @@ def with_readings(tables: Sequence[Table], choices: ImportChoices, where: str) -
     """The tables of a file without those on the clocks of columns beside the angle.
 
     Args:
-        tables: in their order; those of a part with several clocks follow one another.
+        tables: in their order; a part with several clocks has its tables one after another.
     """
     kept = []
     for _, group in groupby(tables, key=lambda table: (table.part, bool(table.native))):
@@ -219,7 +219,7 @@ def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[RunColu
     starts = [i for i, c in enumerate(table.channels) if matches(c, choices.time or "") or is_time(c)]
     stems = {stem(table.channels[i].name) for i in starts}
     blocks = [table.channels]
-    # Several blocks of columns side by side, each of which begins with its own times.
+    # Several blocks of columns side by side; each begins with its own times.
     if len(starts) > 1 and (len(stems) == 1 or all("#" in table.channels[i].name for i in starts)):
         ends = [*starts[1:], len(table.channels)]
         blocks = [table.channels[start:end] for start, end in zip(starts, ends, strict=True)]

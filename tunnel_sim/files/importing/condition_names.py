@@ -58,7 +58,7 @@ _LIKE = {
         r"(.*[ _])?(spring|feder|stiffness|steifigkeit)[ _]?(k|const\w*|rate)?"
     ),
 }
-"""Names without a unit that may be those of a condition, and of other things."""
+"""Names without a unit that may mean a condition, or something else."""
 _WINDY = re.compile(
     r"(?i)(?<![a-z])(wind|air|flow|free_?stream|tunnel|pitot|anemometer|prandtl|fan|blower|gebl[äa]se|str[öo]mung|"
     r"luft|windkanal)(?![a-z])|(?<![a-z])(air|wind|flow|fan)_?(speed|spd|vel)|(?<![a-z])[uv]_?(inf|∞|mean|air|wind|"

@@ -215,7 +215,7 @@ def _hint(name: str, unit: str, key: str | None, value: float) -> Hint | None:
         )
     if unit:
         value = value * (in_si(key, unit) or 1.0)
-        what, why = f"'{shown_name}'{number} in {unit}", "its name is not that of a condition"
+        what, why = f"'{shown_name}'{number} in {unit}", "its name is not a condition's"
     else:
         what, why = f"'{shown_name}'{number}", f"it may be {key}, but has no unit"
     return Hint(key, value, what, why, use, option=option)
@@ -315,7 +315,7 @@ def open_conditions(
 ) -> tuple[list[ImportRemark], bool]:
     """Remarks on unused content that resembles a condition, and whether an air density is missing.
 
-    Wind-off is not assumed where a wind is suggested; what the wind needs beside its speed is asked for at once.
+    Wind-off is not assumed where a wind is suggested; the other statements that a wind needs are asked for at once.
 
     Args:
         known: conditions of the run.

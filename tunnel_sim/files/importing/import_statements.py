@@ -1,4 +1,4 @@
-"""What an import knows beside the content of a file: choices, a calibration, a table of conditions, and names."""
+"""Statements to an import beside the content of a file: choices, a calibration, a table of conditions, names."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 
 @dataclass(frozen=True, eq=False)
 class ImportStatements:
-    """What is known beside the content of the files.
+    """Statements beside the content of the files.
 
     Args:
         table: of conditions; None: there is none.

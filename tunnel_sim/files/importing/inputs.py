@@ -68,9 +68,7 @@ def find_input(
             use = "times are" if stated is clock else "angle is"
             column = f"'{one_line(choices.input, 40)}' is the column {stated.quoted}"
             what = f"{column}, from which the {use} read"
-            remedy = (
-                "give --input with the name or number of another column, or --angle with that of the angle"
-            )
+            remedy = "give --input with the name or number of another column, or --angle with the angle's"
             raise TunnelError(what, where=where, remedy=remedy)
         if stated is None:
             what = f"no column '{one_line(choices.input, 40)}' for the input"
@@ -124,7 +122,7 @@ def _as_input(
     factor, name = kind.factor(channel.unit), one_line(channel.name, 40)
     if kind.of_spring and channel.unit in ("", "counts"):
         if choices.calibration is not None or (channel.unit and choices.counts_per_turn is None):
-            what = f"'{name}' states no unit of an angle, and that of the reading is not its own"
+            what = f"'{name}' has no unit of an angle, and the reading's unit is not its own"
             remedy = (
                 f"give the unit in its name, such as {name}_deg; or --input-as drive, whose gain is fitted"
             )

@@ -224,7 +224,7 @@ def _refusal(faults: Sequence[TunnelError]) -> TunnelError:
 
 
 def _names(label: str, pieces: Sequence[RecordPiece]) -> list[str]:
-    """The names of the runs of a record: its own for the only one; what is not a run is counted separately."""
+    """The names of the runs of a record: its own for the only one; other parts are counted separately."""
     kept = sum(not piece.doubt for piece in pieces)
     runs = iter([label] if kept == 1 else [f"{label}-{k}" for k in range(1, kept + 1)])
     others = iter(f"{label}-other-{k}" for k in range(1, len(pieces) - kept + 1))

@@ -319,7 +319,7 @@ def _piece(
 
 
 def _judged(found: Sequence[_Decay], swings: Swings, reading: PerSample) -> list[_Decay]:
-    """The decays that are runs, and with a doubt those that are the motion of something else.
+    """The decays that are runs; with a doubt also the motion of something else.
 
     A brief motion is not a run if it swings at another frequency than the longest one; nor if it is small, beside
     the centre of the longest one and just before a release: a hand holds the body there.
@@ -398,7 +398,7 @@ def _let_go(angle: Angles, piece: RecordPiece, noise: float) -> int:
 def with_added(
     time_s: Times, found: Mapping[str, RecordPiece], stated: Sequence[Stretch]
 ) -> dict[str, RecordPiece]:
-    """The runs of a record by name, and those that the user adds; an added release ends the run before it.
+    """The runs of a record by name, with the user's additions; an added release ends the run before it.
 
     Args:
         stated: the added runs, with their start, s.

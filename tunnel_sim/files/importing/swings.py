@@ -119,7 +119,9 @@ def swings_of(time_s: Times, reading: PerSample, half: Seconds, drift: float = 0
     stays = clock[left] - clock[reached]
     held = stays > _HELD * np.append(ahead, ahead[-1]) + slack
     slow = across > _SLOW * _USUAL_ACROSS * ahead + slack
-    if not held[0] and size.size > 1:  # the record may begin within a swing, of which a sinusoid needs a part
+    if (
+        not held[0] and size.size > 1
+    ):  # the record may begin within a swing, and a sinusoid needs a part of it
         part = np.arccos(1.0 - 2.0 * min(1.0, size[0] / max(size[1], least))) / np.pi
         slow[0] |= lasts[0] > _SLOWER * part * ahead[0] + block * step
     return Swings(
@@ -165,7 +167,7 @@ def _ranges(values: Array, width: int) -> Array:
 
 
 def _turns(values: Array, least: Array) -> NDArray[np.intp]:
-    """Indices of alternate extremes, from each of which the values return by more than the least at it."""
+    """Indices of alternate extremes; the values return from each by more than its least."""
     steps = np.flatnonzero(np.diff(values))
     signs = np.sign(np.diff(values)[steps])
     inner = steps[1:][signs[1:] != signs[:-1]]

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import polars as pl
 
 INPUT_FACTS = INPUT_KEYS
-"""What a file may state of the input of a run, as an export writes it."""
+"""Statements about the input of a run in a file, as an export writes them."""
 
 _RUN_NAMES = re.compile(
     r"(?i)(run|trial|versuch|lauf)[ _]?(id|name|no|nr|number|nummer|#)?\.?|"

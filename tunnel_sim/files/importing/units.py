@@ -62,7 +62,7 @@ _ALIKE = str.maketrans(
 _GERMAN = re.compile(
     r"(?i)winkel|drehung|ausschlag|auslenkung|lage|gier|steifigkeit|feder|geschwindigkeit|rate"
 )
-"""Names beside which ``grad`` is the German degree; alone it may be the gon, of which a turn has 400."""
+"""Names beside which ``grad`` is the German degree; alone it may be the gon (a turn has 400)."""
 _BRACKETS = re.compile(r"\s*[(\[{<]\s*(?:in\s+)?([^()\[\]{}<>]*?)\s*[)\]}>]")
 _IN = re.compile(r"(?i)(?<=\S)[\s_]+in[\s_]+(?=\S)")
 _SEPARATOR = re.compile(r"(?<=\w)(?:\s+[-–—]\s+|[\s_,:]*[\s_,:/][\s_,:]*)")
@@ -188,7 +188,7 @@ def _after_in(heading: str) -> tuple[str, str] | None:
 
 
 def _after_separator(heading: str) -> tuple[str, str] | None:
-    """``t/s``, ``yaw_deg`` or ``time, min``: a known unit after a separator, of which the first counts."""
+    """``t/s``, ``yaw_deg`` or ``time, min``: a known unit after a separator; the first counts."""
     text = _PER.sub("/", heading)
     for place, found in enumerate(_SEPARATOR.finditer(text)):
         name, word = text[: found.start()], text[found.end() :]

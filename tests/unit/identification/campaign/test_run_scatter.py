@@ -115,7 +115,7 @@ def test_the_repeatability_is_printed_and_goes_through_json(scattered):
 
 
 def test_runs_that_cannot_show_a_scatter_say_so_once(steady):
-    for count, words in ((1, "one run"), (2, "runs of which none repeats another")):
+    for count, words in ((1, "one run"), (2, "runs without a repeat")):
         few = replace(steady, runs=steady.runs[:count])
         (line,) = repeatability_lines(identify(few, "matrix_pencil").to_json_dict())
         assert words in line

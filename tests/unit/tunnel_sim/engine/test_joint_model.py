@@ -157,7 +157,7 @@ def test_a_spring_of_tendons_is_refused(tmp_path: Path) -> None:
         f'{BOB}<site name="b" pos="0 0 -0.3"/></body></worldbody><tendon>'
         '<spatial stiffness="30" springlength="0.1"><site site="a"/><site site="b"/></spatial></tendon></mujoco>'
     )
-    with pytest.raises(TunnelError, match="its restoring moment is not that of gravity and of springs"):
+    with pytest.raises(TunnelError, match="its restoring moment comes not only from gravity and springs"):
         read_joint_model(path, "hinge", Recorded(1.0))
 
 

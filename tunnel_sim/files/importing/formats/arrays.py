@@ -29,12 +29,12 @@ def tables_of_arrays(
 ) -> list[Table]:
     """Tables of arrays: arrays of the same group and length belong together.
 
-    Single numbers are facts of the tables of their group and below; those of a group without records describe
+    Single numbers are facts of the tables of their group and below; the numbers of a group without records describe
     the groups beside it.
 
     Args:
         arrays: by path, with ``/`` between groups; matrices hold one channel in each row or column.
-        texts: by path; those of every group are beside all tables.
+        texts: by path; every group's are beside all tables.
     """
     facts: dict[str, dict[str, float]] = {}
     groups: dict[tuple[str, int], list[Channel]] = {}

@@ -51,7 +51,7 @@ class _Header:
     lines: Sequence[str]
 
     def text(self, key: str, column: int) -> str:
-        """What the header states of a column."""
+        """The header's statements about a column."""
         cells = self.cells.get(key, ())
         return cells[column - 1].strip() if 0 < column <= len(cells) else ""
 
@@ -181,7 +181,7 @@ def _is_time(header: _Header) -> bool:
 def _by_clocks(
     channels: Sequence[Channel], labels: Mapping[int, int], header: _Header, kind: str
 ) -> list[Table]:
-    """One table where the columns of times are those of all readings; else one for each stated clock."""
+    """One table where all readings share the columns of times; else one for each stated clock."""
     readings = [channel for channel in channels if channel.place - 1 in labels]
     clocks = [channel for channel in channels if channel.place - 1 not in labels and channel.name != _COMMENT]
     waves = []

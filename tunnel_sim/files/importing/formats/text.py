@@ -183,7 +183,7 @@ def _beside(rows: Sequence[Sequence[str]], numeric: Sequence[int]) -> tuple[tupl
 
 
 def _of_scope(lines: Sequence[str], units: Sequence[str], numeric: Sequence[int]) -> list[str]:
-    """The units of columns; of those without, as an oscilloscope states them for both axes."""
+    """The units of columns; where they have none, as an oscilloscope states them for both axes."""
     stated: dict[str, list[str]] = {}
     for line in lines:
         found = _AXIS.match(line.replace('"', ""))
@@ -295,7 +295,7 @@ def read_text_tables(
 
 
 def check_table(content: bytes, width: int, where: str) -> None:
-    """Refuse a table of text of too many columns, lines or cells."""
+    """Refuse a text table with too many columns, lines or cells."""
     check_count(width, limits.COLUMNS, "columns", where, "leave out columns that are not needed")
     lines = content.count(b"\n")
     check_count(lines, limits.CAMPAIGN_SAMPLES, "lines", where, "split the file, or thin it out")

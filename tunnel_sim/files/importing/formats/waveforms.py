@@ -89,7 +89,7 @@ def _table(
             remarks.append(f"'{name}' is sampled more often: its samples at the times of the table are used")
     facts: dict[str, float] = {}
     texts: dict[str, str] = {}
-    for wave in sorted(waves, key=lambda one: one in clock):  # those of the clock count
+    for wave in sorted(waves, key=lambda one: one in clock):  # waves of the clock count
         facts |= wave.facts
         texts |= wave.texts
     if first.timed:
@@ -108,7 +108,7 @@ def _table(
 
 
 def _one_clock(first: Waveform, second: Waveform) -> bool:
-    """Whether two waveforms have the same times; one without a step may have those of any other as long as it."""
+    """Whether two waveforms have the same times; without a step, any other of the same length may share them."""
     if first.size != second.size:
         return False
     if not second.timed:

@@ -138,7 +138,7 @@ def test_a_unit_that_is_not_known_is_said_and_the_column_left_out(tmp_path: Path
     assert found.campaign.runs[0].spring_stiffness is None
     said = "\n".join(found.remarks())
     assert "'Kr (N/m)' is left out: its unit is not one of N m/rad" in said
-    assert "'Velocity' in m/s is left out: its name is not that of a condition" in said
+    assert "'Velocity' in m/s is left out: its name is not a condition's" in said
 
 
 def test_the_user_and_the_table_come_before_the_columns(tmp_path: Path) -> None:

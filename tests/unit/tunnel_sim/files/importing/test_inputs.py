@@ -74,7 +74,7 @@ def test_a_command_without_a_unit_has_that_of_the_angle(tmp_path: Path) -> None:
     assert run.drive is not None
     np.testing.assert_allclose(run.drive.values, COMMAND, atol=1e-7)
     volts = {"goal_position": COMMAND, "position (V)": ANGLE / 2.0}
-    with pytest.raises(TunnelError, match="'goal_position' states no unit of an angle"):
+    with pytest.raises(TunnelError, match="'goal_position' has no unit of an angle"):
         log(tmp_path, ImportChoices(calibration="2*V"), **volts)
 
 
