@@ -18,8 +18,8 @@ from tunnel_sim.envs.information import Prior
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary import limits
-from tunnel_sim.vocabulary.arguments import Number, checked_choice, env_errors
-from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.arguments import Number, checked_choice, checked_names, env_errors
+from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import (
     POTENTIOMETER_RESOLUTION,
     CampaignPlan,
@@ -217,7 +217,7 @@ def plan_run(
         rng: draws the properties without options, in the order spring, wind speed, release angle, truth in the
             order of `TRUTH`, effects. Nothing is drawn for given options.
     """
-    given = _checked(options or {}, OPTIONS, "reset options")
+    given = checked_names(options or {}, OPTIONS, "reset options", WHERE)
     if given.get("spring") is not None and given.get("spring_stiffness") is not None:
         raise EnvError("spring and spring_stiffness are both given", remedy="give one of them")
     if given.get("spring") is not None:
@@ -243,7 +243,7 @@ def plan_run(
         angle = _number(given, "release_angle", (0.0, 0.0), None, least=-limit, most=limit)
     else:
         angle = float(rng.choice((-1.0, 1.0)) * rng.uniform(*RELEASE_ANGLE))
-    own = _checked(given.get("truth") or {}, TRUTH, "option truth")
+    own = checked_names(given.get("truth") or {}, TRUTH, "option truth", WHERE)
     nominal = rig.dynamics
     inertia = (INERTIA_SHARE[0] * nominal.yaw_inertia, INERTIA_SHARE[1] * nominal.yaw_inertia)
     damping = (DAMPING_SHARE[0] * nominal.mechanical_damping, DAMPING_SHARE[1] * nominal.mechanical_damping)
@@ -278,15 +278,6 @@ def plan_run(
         raise as_env_error(error, "option effects") from error
 
 
-def _checked(options: object, known: Iterable[str], where: str) -> Mapping[str, Any]:
-    if not isinstance(options, Mapping):
-        raise EnvError(f"{options!r} is not a mapping", where=where, remedy="give names and values")
-    for name in options:
-        if name not in known:
-            raise EnvError(f"unknown option {name!r}", where=where, remedy=did_you_mean(str(name), known))
-    return options
-
-
 def _number(
     given: Mapping[str, Any],
     name: str,
@@ -318,8 +309,11 @@ def _effects(
         chosen = {} if spring is None else {spring: condition.spring_stiffness}
         return [EffectSetting(kind.name, {severity.name: value, **chosen})]
     if isinstance(stated, Mapping):
-        pairs = [(name, _checked(values, values, f"effect {name}")) for name, values in stated.items()]
-        return [EffectSetting(str(name), dict(values)) for name, values in pairs]
+        for name, values in stated.items():
+            if not isinstance(values, Mapping):
+                what = f"effect {name} = {values!r} is not a mapping"
+                raise EnvError(what, where="option effects", remedy="give its parameters by name")
+        return [EffectSetting(str(name), dict(values)) for name, values in stated.items()]
     if isinstance(stated, Iterable) and not isinstance(stated, str):
         listed = list(stated)
         if all(isinstance(effect, Effect) for effect in listed):
