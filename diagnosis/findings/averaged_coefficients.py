@@ -390,7 +390,7 @@ def before_the_causes(nominal: Fit, after: Mapping[str, Quantity]) -> dict[str, 
 
 
 def _budget(parts: Mapping[str, float], variance: float) -> dict[str, float]:
-    """Variances by source: those within the answer, and the rest by the other answers.
+    """Variances by source: the sources within the answer, and the rest from the other answers.
 
     The answer's own are scaled where another answer narrows the interval.
     """

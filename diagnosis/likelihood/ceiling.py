@@ -154,7 +154,7 @@ def _spectrum(whole: Normal) -> tuple[Array, Array]:
 
 
 def _log_evidence(values: Array, along: Array, precision: float) -> float:
-    """Twice the logarithm of the evidence over that without the basis."""
+    """Twice the logarithm of the ratio of evidences with and without the basis."""
     return float(np.sum(along**2 / (values + precision)) - np.sum(np.log1p(values / precision)))
 
 
@@ -324,7 +324,7 @@ class Unexplained:
         return Evidence(ceiling, float(drop.sum()), ridge.precision, ridge)
 
     def single(self, kind: str) -> Evidence:
-        """A kind that differs from run to run: short gaps are predicted from their surroundings."""
+        """A kind that differs from run to run; short gaps in a run are predicted from their surroundings."""
         columns = [unit.left(matrix) for unit, matrix in zip(self.runs, self.columns(kind), strict=True)]
         residuals = [unit.left(unit.path.residual) for unit in self.runs]
         # one precision of the prior, as in `Ridge`, for units with coefficients of their own

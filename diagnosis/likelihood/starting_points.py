@@ -357,7 +357,7 @@ def _moderate_change(
 ) -> list[Array] | None:
     """Change of the scaled prediction by an effect, one value lowered until the change is moderate.
 
-    ``values`` has the effect's parameters and is changed in place to those used; ``scaled`` is the index of
+    ``values`` has the effect's parameters and is changed in place to the used values; ``scaled`` is the index of
     the one to lower, None for none; ``replaced`` is the common parameter that it replaces. Where the
     runs differ by chance the change is small: the square of a phase error is an amplitude error, which would
     separate an effect from such differences. An effect of ``second_order`` shows by that square alone.

@@ -126,7 +126,7 @@ class ShownResponse:
 
     @property
     def inertia(self) -> float:
-        """Of the body, kg m², where the scale is known."""
+        """The body's inertia, kg m², where the scale is known."""
         return self.scale / self.gain
 
 

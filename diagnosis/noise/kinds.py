@@ -149,7 +149,7 @@ class Floor(Noise):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Coloured(Estimated):
-    """Noise with the spectrum of the records; its variance is the one of the white noise assumed before.
+    """Noise with the spectrum of the records; its variance equals the white noise's assumed before.
 
     Args:
         spectrum: its power relative to that variance; the other arguments as in `Noise`.

@@ -149,7 +149,7 @@ def remove_hum(
         motion: frequency of the fastest motion, Hz; a line is removed beyond its harmonics.
 
     Returns:
-        The campaign without it, and the hum that was removed. The standard deviation of its frequency is the one of
+        The campaign without it, and the hum that was removed. The standard deviation of its frequency is from
         the peak of all records' windowed spectra under white noise, for the strongest line only. For one record
         with window w the variance of ω is 2 S² Σw²τ²/(a Σwτ²)², τ from its middle: with a flat window that is the
         bound 24 S²/(a² n T²) (Rife & Boorstyn, IEEE Trans. Inf. Theory 20 (1974) 591, doi

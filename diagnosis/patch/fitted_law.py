@@ -45,7 +45,7 @@ class FittedLaw:
 
     @property
     def law(self) -> JointLaw:
-        """Of the given model, in the units of the similar campaign."""
+        """The law of the given model, in the units of the similar campaign."""
         model = self.problem.data.model
         assert isinstance(model, Joint | LooseJoint)
         return model.law

@@ -97,7 +97,7 @@ def weigh_random_moments(view: RunsInView, hypotheses: Sequence[Hypothesis]) -> 
 
     Args:
         view: in which they are fitted.
-        hypotheses: those found without a random moment.
+        hypotheses: found without a random moment.
 
     Returns:
         The likeliest random moment with the best set of effects, and others that explain the runs nearly as well:

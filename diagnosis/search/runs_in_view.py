@@ -33,7 +33,7 @@ class RunsInView:
     prepared: Prepared
     base: Fit
 
-    #: Whether the parameters of an answer are those fitted in the view, not those fitted to whole runs.
+    #: Whether the parameters of an answer are fitted in the view, not to whole runs.
     states_parameters: ClassVar[bool] = False
     #: Whether the gap may be as small as misbehaving noise, which then explains it.
     may_be_noise: ClassVar[bool] = False

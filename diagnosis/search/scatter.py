@@ -165,7 +165,7 @@ def _same_deviations(problem: Problem, point: Point, fitted: Fit) -> Point:
 
 
 def evident(fitted: Fit) -> Fit:
-    """A fit with chance differences where its runs show them beyond those stated; else as stated."""
+    """A fit with chance differences where its runs show more than stated; else as stated."""
     scatter, known = fitted.problem.scatter, fitted.problem.data.repeatability
     if shown := shown_by(fitted):
         widths = fitted.columns.likeliest(width_prior(fitted.problem)).widths
@@ -180,7 +180,7 @@ def evident(fitted: Fit) -> Fit:
 
 
 def shown_by(fitted: Fit) -> tuple[str, ...]:
-    """The chance differences that the runs of a fit show beyond those stated, by name; none where they repeat."""
+    """The unstated chance differences that the runs of a fit show, by name; empty where they repeat."""
     scatter, chosen = fitted.problem.scatter, fitted.settings.scatter
     if not scatter:
         return ()
@@ -246,7 +246,7 @@ def with_scatter(fitted: Fit, scatter: Scatter) -> Fit:
 
 
 def named(fitted: Fit) -> tuple[str, ...]:
-    """The chance differences of a fit that its runs show beyond those stated, as `evident` found them."""
+    """The unstated chance differences that the runs of a fit show, as `evident` returns them."""
     return tuple(one.name for one in fitted.problem.scatter if one.shown)
 
 

@@ -161,7 +161,7 @@ class Study:
 
     @property
     def scattering(self) -> Names:
-        """The chance differences between the runs beyond those stated."""
+        """The unstated chance differences between the runs."""
         return () if self.fitted == UNKNOWN else named(self.chosen)
 
     def named_beside(self, answer: Answer) -> Names:

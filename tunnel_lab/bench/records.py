@@ -104,7 +104,7 @@ class RecordsPage:
         await self._read()
 
     def _show_choices(self, asked: str) -> None:
-        """The fields that a fault asks for and those stated, and the others folded."""
+        """The fields that a fault asks for, the stated fields, and the others folded."""
         keys = preview.choices_to_show(self._session, asked)
         if keys == self._shown_choices:
             return  # the field that is being filled keeps the focus

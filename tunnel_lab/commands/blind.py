@@ -67,7 +67,7 @@ class MixtureOptions:
         float,
         _share(
             "--variety",
-            help="Share of campaigns with another scale; as many each have few runs, coloured noise and uneven "
+            help="Share of campaigns with another scale, and equal shares with few runs, coloured noise or uneven "
             "time stamps.",
         ),
     ] = 0.25

@@ -225,7 +225,7 @@ def _estimate(given: Quantity | None) -> Entry:
 
 
 def _difference(mine: Quantity | None, theirs: Quantity | None) -> Entry:
-    """A coefficient less the one of the first diagnosis, whose errors are assumed to be independent."""
+    """The difference of a coefficient from the first diagnosis, with independent errors."""
     if mine is None or theirs is None or mine.unit != theirs.unit or mine.std is None or theirs.std is None:
         return Entry()
     moved, std = theirs.value - mine.value, math.hypot(mine.std, theirs.std)

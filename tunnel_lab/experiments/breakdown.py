@@ -208,7 +208,7 @@ def realised(draw: CampaignDraw, number: int, seed: int) -> CampaignDraw:
 
 
 def breakdown_of(cases: Sequence[BiasCase], estimators: tuple[str, ...], seed: int) -> Experiment[BiasCase]:
-    """Some estimators on every case; the results have a row of `ANSWER_COLUMNS` for each quantity.
+    """Run estimators on every case; the results have a row of `ANSWER_COLUMNS` for each quantity.
 
     Args:
         seed: of the cases.

@@ -57,7 +57,7 @@ class Failure:
     error: str = ""
 
     def of(self, estimator: str) -> Failed:
-        """The failure as one of an estimator's."""
+        """The failure of one estimator."""
         return Failed(estimator, self.status, 1, self.shown)
 
 

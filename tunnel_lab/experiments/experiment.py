@@ -81,7 +81,7 @@ class Experiment(Generic[TaskT]):
         about: further entries of the manifest, for people.
         elsewhere: the remedy where a folder holds something else.
         code_matters: whether results of changed code are refused, as where the code is what is examined.
-        described: the description in a manifest as of this version; an error if it is none.
+        described: convert a manifest's description to this version; raises for anything else.
     """
 
     kind: str

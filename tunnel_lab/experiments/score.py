@@ -72,7 +72,7 @@ class TrialBatch:
 
 
 def score_of(grid: Grid, estimators: tuple[str, ...]) -> Experiment[TrialBatch]:
-    """Some estimators on every trial of a grid, ordered across cells, to estimate the remaining time early."""
+    """Run estimators on every trial of a grid, in an order across cells that shows the remaining time early."""
     return Experiment(
         "score",
         [

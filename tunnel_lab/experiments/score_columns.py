@@ -107,7 +107,7 @@ class ScoredRow:
 
     @property
     def coverage(self) -> Proportion | None:
-        """Of the 95 % intervals, among the trials with an estimate; None where there is none."""
+        """Coverage of the 95 % intervals among the trials with an estimate; None where there is none."""
         identified = sum(trials.error.size for trials in self.cells)
         return Proportion(sum(trials.covered for trials in self.cells), identified) if identified else None
 

@@ -114,7 +114,7 @@ class CoulombFriction(Friction):
 
     @classmethod
     def forms(cls) -> tuple[tuple[str, ...], ...]:
-        """The contact's deflection, each dependence on the rate, that on the load, and it with the deflection."""
+        """Presliding, each dependence on the rate, the dependence on the load, and both load and presliding."""
         by_rate = ("exponent",), ("saturation",), ("peak", "peak_rate")
         return ("presliding",), *by_rate, ("load",), ("presliding", "load")
 

@@ -148,7 +148,7 @@ class _TwoMasses:
         return free / (self.rod + self.rod_loss * root - free)
 
     def roots(self) -> tuple[complex, complex] | None:
-        """Of the slow and of the fast oscillation, 1/s; None where one does not oscillate, or they are close."""
+        """The slow and the fast root, 1/s; None where one does not oscillate, or they are close."""
         lead, slow = 0j, 0j
         for _ in range(_MOST_ITERATIONS):
             previous = slow
@@ -174,7 +174,7 @@ class _TwoMasses:
         return (slow, fast) if fast.imag > 0.0 and abs(fast) > SEPARATION * abs(slow) else None
 
     def residue(self, root: complex, *, on_body: bool) -> complex:
-        """Of the upper end's angle per moment on the body or on the upper end, at a root, rad/(N m s)."""
+        """Residue of the upper end's angle per moment on the body or on the upper end, at a root, rad/(N m s)."""
         lead = self.lead(root)
         body = 1.0 + lead
         turning = 2.0 * root * (self.upper + self.lower * body**2)

@@ -76,7 +76,7 @@ class ByMoment(View):
         return cls(prepared, (small or bases)[0], known)
 
     def sets(self, clock: StepClock) -> Sets:
-        """The sets found here, beside those found by the angle, which are not grown again."""
+        """The sets found here, beside the sets from the angle, which are not grown again."""
         return replace(super().sets(clock), random=self.known.random, refused=self.known.refused)
 
     def whole(self, hypothesis: Hypothesis) -> Hypothesis | None:

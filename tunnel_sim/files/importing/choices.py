@@ -45,7 +45,7 @@ class Stretch(StrictModel):
     start: float | None = optional("the time of the release by the file's clock, in s")
     end: float | None = optional("the time at which the run ends by the file's clock, in s")
     rest: float | None = optional("the reading at rest in rad, to be subtracted")
-    record: OneLine | None = optional("the name of the record, where its run is added to those found")
+    record: OneLine | None = optional("the name of the record, where its run is added to the others")
 
 
 class ImportChoices(StrictModel):

@@ -74,7 +74,7 @@ class Imported:
         return [*self._with_places(path), *self.said]
 
     def summary(self) -> tuple[list[str], list[str]]:
-        """The remarks beside the table of runs, without its numbers: those to know, and those to judge."""
+        """The remarks beside the table of runs, without its numbers: remarks to know, and remarks to judge."""
         lines = self._with_places(short=True)
         judged = [line for line in lines if line.doubt]
         return [*(line for line in lines if not line.doubt), *self.said], list(judged)

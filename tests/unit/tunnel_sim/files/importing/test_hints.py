@@ -82,7 +82,10 @@ def test_sizes_of_the_rig_have_units(tmp_path: Path) -> None:
     [
         ("V: 15", "'V' = 15 is left out: it may be wind_speed, but has no unit"),
         ("U = 15", "'U' = 15 is left out"),
-        ("Geschwindigkeit: 54 km/h", "'Geschwindigkeit' = 15 in m/s is left out: its name is not a condition's"),
+        (
+            "Geschwindigkeit: 54 km/h",
+            "'Geschwindigkeit' = 15 in m/s is left out: its name is not a condition's",
+        ),
         ("Wind speed: 12 furlong", "its unit is not one of m/s, km/h"),
     ],
 )
