@@ -44,7 +44,7 @@ class TurningPointFit:
         decrement: logarithmic, of a whole period.
         zero: angle at rest, rad.
         first_swing: excursion from ``zero`` at the first turning point, rad.
-        said: sentences on the uncertainties, and on departures from the model.
+        remarks: sentences on the uncertainties, and on departures from the model.
     """
 
     omega_n: FittedNumber
@@ -53,7 +53,7 @@ class TurningPointFit:
     decrement: FittedNumber
     zero: FittedNumber
     first_swing: FittedNumber
-    said: tuple[str, ...]
+    remarks: tuple[str, ...]
 
 
 def fit_turning_points(points: TurningPoints) -> TurningPointFit:
@@ -86,7 +86,7 @@ def fit_turning_points(points: TurningPoints) -> TurningPointFit:
         decrement=FittedNumber(2.0 * delta, 2.0 * stds[2]),
         zero=FittedNumber(zero, stds[0]),
         first_swing=FittedNumber(swing, stds[1]),
-        said=tuple(remarks),
+        remarks=tuple(remarks),
     )
 
 

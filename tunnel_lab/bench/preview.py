@@ -268,7 +268,7 @@ def drawn(imported: Imported, order: Sequence[str] = ()) -> list[DrawnRecord]:
         time, file, marks = raw.cleaned.file_time_s, raw.source.name, []
         for part in parts:
             start, end = float(time[part.piece.first]), float(time[part.piece.last - 1])
-            fault, of_user = part.said[-1] if part.run is None else "", (file, part.id) in added
+            fault, of_user = part.remarks[-1] if part.run is None else "", (file, part.id) in added
             marks.append(Mark(part.id, file, start, end, *_rest(part, unit), fault, doubts[part.id], of_user))
         cut = imported.choices.cut and not raw.whole and raw.input is None
         curve = points(time, raw.cleaned.reading)
@@ -279,8 +279,10 @@ def drawn(imported: Imported, order: Sequence[str] = ()) -> list[DrawnRecord]:
 def doubts_of(part: ImportedRun) -> tuple[str, ...]:
     """The doubts about the motion of a run for the user to judge, one line each, as the import states them."""
     if part.run is None:
-        return () if part.said[-1] == LEFT_OUT else (part.said[-1],)
-    return tuple(remark.motion for remark in part.said if isinstance(remark, ImportRemark) and remark.motion)
+        return () if part.remarks[-1] == LEFT_OUT else (part.remarks[-1],)
+    return tuple(
+        remark.motion for remark in part.remarks if isinstance(remark, ImportRemark) and remark.motion
+    )
 
 
 def points(time: Array, reading: Array) -> tuple[list[float], list[float | None]]:

@@ -228,7 +228,7 @@ def _show_turning_points(points: TurningPoints, json: Path | None) -> None:
     from identification.status import Status
     from tunnel_sim.files.writing import json_text, write_json
 
-    for line in points.said:
+    for line in points.remarks:
         say(f"Note: {points.name}: {line}", stderr=True)
     fit = fit_turning_points(points)
     omega = Quantity(fit.omega_n.value, fit.omega_n.std, "rad/s")
@@ -253,7 +253,7 @@ def _show_turning_points(points: TurningPoints, json: Path | None) -> None:
     heading = "value ± one standard deviation"
     title = f"{points.name}: {points.time_s.size} turning points"
     show([TextTable(title, ("quantity", heading), cells, right=(heading,))])
-    for line in fit.said:
+    for line in fit.remarks:
         say(f"Note: {line}")
     say(
         "Note: turning points give ωn and ζ alone; a campaign, and a diagnosis, need the angle between them too"

@@ -26,7 +26,7 @@ class TurningPoints:
         time_s: increasing.
         time_std: standard deviation of the times as stated; None where it is not stated.
         angle_std: standard deviation of the angles as stated; None where it is not stated.
-        said: how they were read.
+        remarks: how they were read.
     """
 
     name: str
@@ -34,7 +34,7 @@ class TurningPoints:
     angle_rad: Angles
     time_std: Times | None = None
     angle_std: Angles | None = None
-    said: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
 
     @property
     def half_periods(self) -> PerSample:

@@ -45,7 +45,7 @@ class Cleaned:
     time_s: Times
     reading: Readings
     rows: NDArray[np.intp]
-    said: tuple[str, ...]
+    remarks: tuple[str, ...]
     first_s: Seconds = 0.0
 
     @property

@@ -60,14 +60,14 @@ class RunColumns:
     Args:
         run: its name in the table.
         input: None for a free decay.
-        said: remarks, first on the choice of the columns, then on their numbers.
+        remarks: first on the choice of the columns, then on their numbers.
     """
 
     run: str
     time: RunColumn
     reading: RunColumn
     input: RunColumn | None = None
-    said: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
 
     @property
     def used(self) -> tuple[Channel, ...]:
@@ -101,7 +101,7 @@ def find_columns(
         several, runs = [fault], [fault.columns]
     found = [_as_numbers(table, run, choices, calibration, where, several) for run in runs]
     if len(found) == 1:  # beside several runs, other columns belong to other runs
-        found = [replace(found[0], said=(*found[0].said, *_unused(table, found[0], choices)))]
+        found = [replace(found[0], remarks=(*found[0].remarks, *_unused(table, found[0], choices)))]
     return found
 
 
@@ -126,7 +126,7 @@ def _as_numbers(
         driven = attempt(faults, partial(find_input, table.channels, clock, reading, choices, where))
     if time is None or reading is None or faults:
         raise Unread(joined(faults), run)
-    remarks = [*run.said, *time.why, *reading.why, *(() if driven is None else driven.why)]
+    remarks = [*run.remarks, *time.why, *reading.why, *(() if driven is None else driven.why)]
     if table.native:
         remarks += _apart(table, channel, driven, choices, where)
         if driven is not None and (outside := _without_input(reading, driven)).any():
@@ -137,7 +137,7 @@ def _as_numbers(
 
 def _unused(table: Table, columns: RunColumns, choices: ImportChoices) -> list[str]:
     """The unused columns, and which of them move before or with the reading."""
-    named_before = " ".join(columns.said)
+    named_before = " ".join(columns.remarks)
     others = [
         channel
         for channel in _unconditional(table.channels, choices)
@@ -269,7 +269,7 @@ def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[RunColu
 def _pair(time: Channel, reading: Channel, run: str = "", said: tuple[str, ...] = ()) -> RunColumns:
     """The columns of a run as in the file."""
     clock = RunColumn(time, time.values, time.unit, "time")
-    return RunColumns(run, clock, RunColumn(reading, reading.values, reading.unit, "angle"), said=said)
+    return RunColumns(run, clock, RunColumn(reading, reading.values, reading.unit, "angle"), remarks=said)
 
 
 def _refuse_without_angle(channels: Sequence[Channel], where: str) -> NoReturn:

@@ -50,7 +50,7 @@ class ConditionTable:
             what = f"the column '{one_line(names[used[key]], 40)}' is not in a unit of {key}"
             raise TunnelError(what, where=shown(path), remedy=f"use one of {units_of(key)}")
         self.ignored = tuple(n for i, n in enumerate(names) if i != self._key and i not in used.values())
-        self.said = [
+        self.remarks = [
             f"{path.name}: {key} from '{names[i]}'"
             for key, i in used.items()
             if key and names[i].strip().lower() != key

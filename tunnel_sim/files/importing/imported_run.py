@@ -42,7 +42,7 @@ class ImportedRun:
     raw: RawRecord
     piece: RecordPiece
     run: Run | None
-    said: tuple[str, ...]
+    remarks: tuple[str, ...]
     rest: float | None
     sizes: Mapping[str, float]
     held: Mapping[str, float] = field(default_factory=dict)

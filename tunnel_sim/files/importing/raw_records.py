@@ -59,7 +59,7 @@ class RawRecord:
     reading: RunColumn
     cleaned: Cleaned
     stated: Stated
-    said: tuple[str, ...]
+    remarks: tuple[str, ...]
     table_rows: NDArray[np.intp]
     clock: Rows
     whole: bool
@@ -133,11 +133,11 @@ def _records(
     """The cleaned records of the columns of a run: one, or one from each start of the clock.
 
     Args:
-        said: remarks on its conditions.
+        remarks: on its conditions.
     """
     records = []
     kept, remarks = _from_start_to_end(columns.time.values, choices)
-    remarks = [*columns.said, *remarks, *said]
+    remarks = [*columns.remarks, *remarks, *said]
     driven = columns.input
     time, readings = columns.time.values[kept], columns.reading.values[kept]
     facts = {key: value for key in INPUT_FACTS if np.isfinite(value := table.facts.get(key, np.nan))}
@@ -152,7 +152,7 @@ def _records(
         rows = np.flatnonzero(kept)[a:b]
         angles = columns.reading.role == "angle" and driven is None
         if angles and are_turning_points(clean.time_s, clean.reading):
-            told = [*table.said, *remarks]
+            told = [*table.remarks, *remarks]
             raise HoldsTurningPoints(_turning_points(name, table, columns, rows, clean, told, choices), where)
         if clean.time_s.size < 2:
             raise TunnelError("fewer than two samples", where=where, remedy="leave it out")
@@ -173,7 +173,7 @@ def _records(
                 reading=replace(columns.reading, values=clean.reading),
                 cleaned=clean,
                 stated=stated,
-                said=(*remarks, *clean.said),
+                remarks=(*remarks, *clean.remarks),
                 table_rows=rows,
                 clock=time[a:b] - np.nanmin(np.where(np.isfinite(readings[a:b]), time[a:b], np.nan)),
                 whole=table.named and len(starts) == 2,

@@ -58,7 +58,7 @@ class Imported:
     parts: tuple[ImportedRun, ...]
     sources: tuple[Source, ...]
     choices: ImportChoices
-    said: tuple[str, ...]
+    campaign_remarks: tuple[str, ...]
     sizes: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -71,20 +71,20 @@ class Imported:
 
     def remarks(self, path: Path | None = None) -> list[str]:
         """Remarks on the reading of all files or one, and on changes, each once with its runs."""
-        return [*self._with_places(path), *self.said]
+        return [*self._with_places(path), *self.campaign_remarks]
 
     def summary(self) -> tuple[list[str], list[str]]:
         """The remarks beside the table of runs, without its numbers: remarks to know, and remarks to judge."""
         lines = self._with_places(short=True)
         judged = [line for line in lines if line.doubt]
-        return [*(line for line in lines if not line.doubt), *self.said], list(judged)
+        return [*(line for line in lines if not line.doubt), *self.campaign_remarks], list(judged)
 
     def _with_places(self, path: Path | None = None, *, short: bool = False) -> list[ImportRemark]:
         """The remarks on files and runs, each once after the places that it concerns."""
         sources = [source for source in self.sources if path in (None, source.path)]
         parts = [part for part in self.parts if path in (None, part.raw.source)]
-        found = [(text, s.path.name) for s in sources for table in s.tables for text in table.said]
-        found += [(text, part.id) for part in parts for text in (*part.raw.said, *part.said)]
+        found = [(text, s.path.name) for s in sources for table in s.tables for text in table.remarks]
+        found += [(text, part.id) for part in parts for text in (*part.raw.remarks, *part.remarks)]
         places: dict[ImportRemark, list[str]] = {}
         for text, place in dict.fromkeys(found):
             remark = text if isinstance(text, ImportRemark) else ImportRemark(text)
@@ -149,7 +149,7 @@ def read_records(
     check_count(count, limits.CAMPAIGN_SAMPLES, "samples in all files", "", "import fewer files at a time")
     sizes = _sizes(parts, choices)
     campaign = _campaign(parts, sizes, name or one_line(stem_of(files[0])), raws[0].quantity)
-    resolved, said = _resolved(choices, sources, raws), _said(campaign, beside.table)
+    resolved, said = _resolved(choices, sources, raws), _campaign_remarks(campaign, beside.table)
     return Imported(campaign, tuple(parts), tuple(sources), resolved, tuple(said), sizes)
 
 
@@ -166,20 +166,20 @@ def _resolved(choices: ImportChoices, sources: Sequence[Source], raws: Sequence[
     return choices.model_copy(update=found)
 
 
-def _said(campaign: Campaign, table: ConditionTable | None) -> list[str]:
+def _campaign_remarks(campaign: Campaign, table: ConditionTable | None) -> list[str]:
     """Remarks on the campaign."""
-    said: list[str] = []
+    remarks: list[str] = []
     if (step := campaign.sensor.resolution) is not None:
         levels = "the readings lie on levels that far apart"
-        said.append(f"resolution {step:.4g} {campaign.sensor.unit}: {levels}")
+        remarks.append(f"resolution {step:.4g} {campaign.sensor.unit}: {levels}")
     if campaign.sensor.zero is not None:
-        said.append(
+        remarks.append(
             "the runs' stated rests differ: a separate zero is fitted to every run (zero = 'per_run')"
         )
-    said += [] if table is None else table.said
+    remarks += [] if table is None else table.remarks
     if table is not None and table.ignored:
-        said.append(f"columns of {table.path.name} that are not conditions: {', '.join(table.ignored)}")
-    return said
+        remarks.append(f"columns of {table.path.name} that are not conditions: {', '.join(table.ignored)}")
+    return remarks
 
 
 def _parts(
@@ -254,7 +254,7 @@ def _campaign(
     runs = tuple(part.run for part in parts if part.run is not None)
     if not runs:
         part = parts[0]
-        what = f"no run can be used; the first one is {part.said[-1]}"
+        what = f"no run can be used; the first one is {part.remarks[-1]}"
         remedy = "check --time, --time-unit, --rate, --angle and --unit, or keep it whole with --no-cut"
         raise TunnelError(what, where=f"{shown(part.raw.source)}, run '{part.id}'", remedy=remedy)
     open_density = any(part.without_density for part in parts)

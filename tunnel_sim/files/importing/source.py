@@ -38,7 +38,7 @@ def read_guarded(
     tables = []
     for table in found["tables"]:
         channels = tuple(Channel(name, next(values), *more) for name, *more in table["channels"])
-        listed = {key: tuple(table[key]) for key in ("said", "native")}
+        listed = {key: tuple(table[key]) for key in ("remarks", "native")}
         apart = tuple(tuple(column) for column in table["apart"])
         tables.append(Table(**table | listed | {"channels": channels, "apart": apart}))
     return tables, found["known"]
@@ -117,7 +117,7 @@ def read_source(path: Path, choices: ImportChoices) -> Source:
         tables, known = read_guarded(place, content, where, choices)
     readable = []
     for table in (table for table in tables if table.channels):
-        channels, said = [], [*table.said]
+        channels, said = [], [*table.remarks]
         for channel in table.channels:
             wild = np.abs(channel.values) > limits.LARGEST_NUMBER  # its powers would overflow
             if wild.any():
@@ -126,7 +126,7 @@ def read_source(path: Path, choices: ImportChoices) -> Source:
                 )
                 channel = replace(channel, values=np.where(wild, np.nan, channel.values))
             channels.append(channel)
-        table = replace(table, channels=tuple(channels), said=tuple(said))
+        table = replace(table, channels=tuple(channels), remarks=tuple(said))
         parts = (with_input_facts(part) for part in by_run(table))
         # A column that names the runs, or states the input, may be alone in its table.
         readable += [part for part in parts if part.channels]

@@ -90,7 +90,7 @@ class Table:
     Args:
         part: sheet, group, structure or run in the file; empty where the file contains one table.
         facts: single numbers beside the columns, by name.
-        said: how the table was read, and what was omitted.
+        remarks: how the table was read, and what was omitted.
         headed: whether the columns are named in the file.
         named: whether the part is the file's name for a run, which the table then contains completely.
         texts: single texts beside the columns, by name.
@@ -102,7 +102,7 @@ class Table:
     channels: tuple[Channel, ...]
     part: str = ""
     facts: Mapping[str, float] = field(default_factory=dict)
-    said: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
     headed: bool = True
     named: bool = False
     texts: Mapping[str, str] = field(default_factory=dict)
@@ -166,13 +166,13 @@ def by_label(table: Table, column: str, starts: NDArray[np.integer], names: Sequ
     if not 0 < len(names) <= rows / _LEAST_EACH or len(set(runs)) < len(runs):
         return [table]
     channels = [channel for channel in table.channels if channel.name != column]
-    said = (*table.said, f"the column '{column}' names the runs")
+    said = (*table.remarks, f"the column '{column}' names the runs")
     return [
         replace(
             table,
             channels=tuple(replace(channel, values=channel.values[a:b]) for channel in channels),
             part="-".join(filter(None, (table.part, name))),
-            said=said,
+            remarks=said,
             named=True,
         )
         for name, a, b in zip(names, [0, *starts], [*starts, rows], strict=True)

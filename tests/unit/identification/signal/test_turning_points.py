@@ -47,12 +47,12 @@ def test_scatter_beyond_what_is_stated_is_said_and_used() -> None:
     given = points(1)
     few = np.full(given.time_s.size, 0.25 * TIME_STD)
     fit = fit_turning_points(TurningPoints("a", given.time_s, given.angle_rad, few, None))
-    assert any("times scatter" in line and "times as stated" in line for line in fit.said)
+    assert any("times scatter" in line and "times as stated" in line for line in fit.remarks)
     assert fit.omega_n.std == pytest.approx(fit_turning_points(given).omega_n.std, rel=1e-6)
 
 
 def test_what_bends_is_said_at_its_rate() -> None:
-    said = [" ".join(fit_turning_points(points(seed)).said) for seed in range(400)]
+    said = [" ".join(fit_turning_points(points(seed)).remarks) for seed in range(400)]
     for word in ("the period changes", "the decrement changes"):
         # At a rate of 1 % of 400: 13 or fewer in all but one in ten thousand cases.
         assert sum(word in line for line in said) <= 13, word
@@ -62,11 +62,11 @@ def test_what_bends_is_said_at_its_rate() -> None:
         k.size
     )
     fit = fit_turning_points(TurningPoints("a", given.time_s, dry))
-    assert any("the damping is not viscous" in line for line in fit.said)
+    assert any("the damping is not viscous" in line for line in fit.remarks)
     slower = given.time_s - 2e-3 * k + 1e-4 * k**2
     assert any(
         "ωn is a mean" in line
-        for line in fit_turning_points(TurningPoints("a", slower, given.angle_rad)).said
+        for line in fit_turning_points(TurningPoints("a", slower, given.angle_rad)).remarks
     )
 
 

@@ -38,7 +38,7 @@ def test_units_are_stated_or_guessed_as_the_importer_does(tmp_path: Path) -> Non
     assert "guessed from a swing of ±" in found["yaw"].source
     wind = found["wind speed"]
     assert (wind.unit, wind.role, wind.units) == ("m/s", "condition", [])
-    said = " ".join(part for raw in preview.read(given)[0].parts for part in raw.raw.said)
+    said = " ".join(part for raw in preview.read(given)[0].parts for part in raw.raw.remarks)
     assert "are taken as ms" in said
     assert "is taken as deg" in said
 

@@ -215,7 +215,7 @@ def test_a_second_release_in_a_run_that_a_file_names_is_to_be_judged(session: Se
     named = imported_run("log", part.raw, piece, beside)
     (said,) = preview.doubts_of(named)
     assert said == "a second release at 5 s, though the file names one run"
-    assert f"{said}; --end log=5 ends it there" in named.said  # the import's sentence, with its option
+    assert f"{said}; --end log=5 ends it there" in named.remarks  # the import's sentence, with its option
 
 
 def test_the_table_has_the_spring_of_a_run_that_still_needs_an_air_density(session: Session) -> None:

@@ -63,7 +63,7 @@ def _read_tables(content: bytes, where: str) -> list[Table]:
         values = column.cast(pl.Float64).fill_null(float("nan")).to_numpy()
         channels.append(Channel(name, values, unit))
     said = f"Parquet file: {counted(len(channels), 'column')} of {counted(frame.height, 'sample')}"
-    table = Table(tuple(channels), said=(said,))
+    table = Table(tuple(channels), remarks=(said,))
     return [table] if runs is None else by_texts(table, runs, frame.get_column(runs))
 
 

@@ -143,7 +143,7 @@ def _visit_records(rows: Sequence[Mapping[str, Any]], path: str, found: _Found) 
         series.append(pl.Series(name, given, dtype=kind))
     split = [split_unit(name) for name in names]
     layout = Layout(0, tuple(name for name, _ in split), tuple(unit for _, unit in split), True, {})
-    (table,) = tables_of(pl.DataFrame(series), layout, ".", None, Table((), said=("",)))
+    (table,) = tables_of(pl.DataFrame(series), layout, ".", None, Table((), remarks=("",)))
     for channel in table.channels:
         own = f"{path}/{channel.name}" if path else channel.name
         found.arrays[own] = channel.values
@@ -161,7 +161,7 @@ def _in_stated_unit(table: Table, found: _Found) -> Table:
         return table
     said = f"'{bare[0].name}' is in {unit}, the unit that the file states"
     channels = tuple(replace(c, unit=unit) if c is bare[0] else c for c in table.channels)
-    return replace(table, channels=channels, said=(*table.said, said))
+    return replace(table, channels=channels, remarks=(*table.remarks, said))
 
 
 def _labelled(table: Table, found: _Found) -> list[Table]:

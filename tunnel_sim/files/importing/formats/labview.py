@@ -142,7 +142,7 @@ def _segment(
     ]
     layout = Layout(0, tuple(distinct([name for name, _ in split])), tuple(units), headed=True, facts={})
     frame = frame_of(body, dialect, layout, texts, None, where)
-    (table,) = tables_of(frame, layout, dialect.decimal, None, Table((), said=(kind,)))
+    (table,) = tables_of(frame, layout, dialect.decimal, None, Table((), remarks=(kind,)))
     own = [one for one in (*head.lines, *header.lines) if re.split(r"[\t,;]", one)[0] not in _KEYS]
     stated = {key: " ".join(filter(None, cells)) for h in (head, header) for key, cells in h.cells.items()}
     facts = facts_in(own)
@@ -153,9 +153,14 @@ def _segment(
     }
     tables = _by_clocks(table.channels, labels, header, kind)
     return [
-        replace(one, facts={**facts, **one.facts}, texts={**notes, **one.texts}, said=(*one.said, *table.said[1:]))
+        replace(
+            one,
+            facts={**facts, **one.facts},
+            texts={**notes, **one.texts},
+            remarks=(*one.remarks, *table.remarks[1:]),
+        )
         for one in tables
-    ]  # fmt: skip
+    ]
 
 
 def _labels(names: Sequence[str], header: _Header) -> dict[int, int]:
@@ -205,14 +210,14 @@ def _by_clocks(
     pairs = zip(readings, waves, strict=True)
     if clocks and all(_agree(clocks, channel, wave, waves[0], readings[0]) for channel, wave in pairs):
         size = f"{counted(len(readings), 'column')} of {counted(clocks[0].values.size, 'sample')}"
-        return [Table((clocks[0], *readings), said=(f"{kind}, {size} beside their times",))]
+        return [Table((clocks[0], *readings), remarks=(f"{kind}, {size} beside their times",))]
     tables = aligned_tables(waves, kind, "Delta_X")
     if len(tables) > 1 or not waves or not waves[0].timed:
         return tables
     first, table = waves[0], tables[0]
     clock = Channel(_X, first.offset + first.step * np.arange(first.size, dtype=np.float64), "s")
-    remarks = (f"{table.said[0]}, at the times X0 + i Delta_X of the header", *table.said[1:])
-    return [replace(table, channels=(clock, *table.channels), said=remarks)]
+    remarks = (f"{table.remarks[0]}, at the times X0 + i Delta_X of the header", *table.remarks[1:])
+    return [replace(table, channels=(clock, *table.channels), remarks=remarks)]
 
 
 def _agree(
@@ -250,5 +255,5 @@ def _joined(before: Sequence[Table], after: Sequence[Table]) -> list[Table]:
         for c, d in zip(first.channels, second.channels, strict=True)
     )
     remark = "segments that follow one another are joined"
-    said = first.said if remark in first.said else (*first.said, remark)
-    return [replace(first, channels=channels, said=said)]
+    said = first.remarks if remark in first.remarks else (*first.remarks, remark)
+    return [replace(first, channels=channels, remarks=said)]

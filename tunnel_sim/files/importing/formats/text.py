@@ -290,7 +290,7 @@ def read_text_tables(
         for i, line in enumerate(head[: layout.first], 1)
         if len(line) <= _LONG_LINE and mentions_wind(line) and not facts_in([line])
     }
-    table = Table((), said=(remark,), facts=layout.facts, texts=texts)
+    table = Table((), remarks=(remark,), facts=layout.facts, texts=texts)
     return tables_of(frame, layout, dialect.decimal, labels, table), known
 
 
@@ -399,7 +399,7 @@ def tables_of(
     frame: pl.DataFrame, layout: Layout, decimal: str, labels: pl.Series | None, table: Table
 ) -> list[Table]:
     """The tables of a sheet with its columns of numbers or times of day: one, or one for each run of the labels."""
-    channels, notes = [], {-1: table.said[0]}
+    channels, notes = [], {-1: table.remarks[0]}
     for i, (name, unit, column) in enumerate(
         zip(layout.names, layout.units, frame.get_columns(), strict=True)
     ):
@@ -429,7 +429,7 @@ def tables_of(
     if labels is not None and layout.runs is not None and labels.len() == frame.height:
         tables = by_texts(table, layout.names[layout.runs], labels)
     said = tuple(note for i, note in notes.items() if not (tables[0].named and i == layout.runs))
-    return [replace(one, said=(*said, *one.said[1:])) for one in tables]
+    return [replace(one, remarks=(*said, *one.remarks[1:])) for one in tables]
 
 
 def _in_parts(column: pl.Series, convert: Callable[[pl.Series], pl.Series]) -> pl.Series:

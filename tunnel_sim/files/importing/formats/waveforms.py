@@ -100,7 +100,7 @@ def _table(
     return Table(
         tuple(channels),
         facts=facts,
-        said=said,
+        remarks=said,
         texts=texts,
         native=names if several else (),
         apart=tuple(apart),

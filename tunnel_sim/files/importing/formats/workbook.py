@@ -79,7 +79,7 @@ def _read(content: bytes, where: str) -> list[Table]:
             if not rows or len(rows) < len(tables):
                 # the texts of a cover are read above, and are not columns of a record
                 short += [
-                    replace(table, part=sheet.name, said=table.said[:1])
+                    replace(table, part=sheet.name, remarks=table.remarks[:1])
                     for table in _tables(book, sheet, _of_sheets([sheet.name], sheet))
                 ]
         several = len(book.sheet_names) > 1
@@ -125,7 +125,7 @@ def _tables(book: Any, sheet: _Sheet, said: str) -> list[Table]:
     kinds = {i: "float" if n and i != layout.runs else "string" for i, n in enumerate(numeric)}
     body = book.load_sheet(sheet.name, header_row=None, skip_rows=layout.first, dtypes=kinds).to_polars()
     labels = None if layout.runs is None else body.to_series(layout.runs)
-    tables = tables_of(body, layout, ".", labels, Table((), facts=layout.facts, said=(said,)))
+    tables = tables_of(body, layout, ".", labels, Table((), facts=layout.facts, remarks=(said,)))
     return [part for table in tables if table.channels for part in by_run(table)]
 
 

@@ -135,7 +135,7 @@ def test_missing_rows_disorder_and_repeats_are_said() -> None:
     assert found.time_s.size == time.size - 1
     np.testing.assert_allclose(found.time_s, np.delete(time, 700), atol=1e-12)
     np.testing.assert_array_equal(found.reading, np.delete(angle, 700))
-    said = "; ".join(found.said)
+    said = "; ".join(found.remarks)
     for part in (
         "1 sample without a number",
         "sorted by time",
@@ -150,14 +150,14 @@ def test_stamps_coarser_than_the_sampling_are_spread() -> None:
     time, angle = decay()
     found = cleaned(np.floor(time * 50.0) / 50.0, angle)
     assert found.time_s.size == time.size
-    assert "coarser than the sampling" in "; ".join(found.said)
+    assert "coarser than the sampling" in "; ".join(found.remarks)
     assert np.abs(found.time_s - time).max() <= 0.02
 
 
 def test_uneven_stamps_are_kept_and_said() -> None:
     time, angle = decay()
     uneven = cleaned(time + 4e-4 * np.sin(np.arange(time.size)), angle)
-    assert "differ from an even clock by up to" in "; ".join(uneven.said)
+    assert "differ from an even clock by up to" in "; ".join(uneven.remarks)
     np.testing.assert_allclose(uneven.time_s, time + 4e-4 * np.sin(np.arange(time.size)), atol=1e-8)
 
 
@@ -257,7 +257,7 @@ def test_rows_of_one_run_are_sorted_however_mixed_up() -> None:
     shuffled = np.random.default_rng(1).permutation(time.size)
     found = cleaned(time[shuffled], angle[shuffled])
     np.testing.assert_array_equal(found.reading, angle)
-    assert "sorted" in "; ".join(found.said)
+    assert "sorted" in "; ".join(found.remarks)
 
 
 def test_coarse_stamps_are_not_spread_across_a_gap() -> None:

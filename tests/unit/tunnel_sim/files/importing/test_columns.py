@@ -55,7 +55,7 @@ def pairs(*channels: Channel, headed: bool = True, **choices: object):
     """What is taken of some columns, by name, and why."""
     found = find_pairs(Table(channels, headed=headed), ImportChoices(**choices), "log.csv")  # type: ignore[arg-type]
     taken = [(pair.run, pair.time.channel.name or None, pair.reading.channel.name) for pair in found]
-    return taken, [words for pair in found for words in pair.said]
+    return taken, [words for pair in found for words in pair.remarks]
 
 
 def test_columns_may_be_chosen_by_their_numbers() -> None:

@@ -31,8 +31,8 @@ def test_tables_come_back_as_they_were() -> None:
             assert one.values.dtype == np.float64
             np.testing.assert_array_equal(one.values, other.values)
             np.testing.assert_array_equal(np.signbit(one.values), np.signbit(other.values))
-        assert (found.part, found.said, found.headed, found.named) == (
-            truth.part, truth.said, truth.headed, truth.named
+        assert (found.part, found.remarks, found.headed, found.named) == (
+            truth.part, truth.remarks, truth.headed, truth.named
         )  # fmt: skip
         assert str(found.facts) == str(dict(truth.facts))
 
