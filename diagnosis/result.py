@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 import polars as pl
 
-from diagnosis.findings.cautions import CAUTIONS, NOISE, PATCH, remark, said
+from diagnosis.findings.cautions import CAUTIONS, NOISE, PATCH, remark, sentence_of
 from diagnosis.findings.coefficients import coefficient_note
 from diagnosis.findings.place import where_words
 from diagnosis.findings.remainder import closable_words
@@ -46,10 +46,12 @@ class Diagnosis(Findings):
             rest=rest,
             closable=self.closable and replace(self.closable, words=closable_words(self.closable, self)),
             coefficients=replace(self.coefficients, note=coefficient_note(self.coefficients, self)),
-            noise=replace(self.noise, reason="" if found.noise is None else said(NOISE, found.noise, unit)),
-            cautions=tuple(said(CAUTIONS, one, unit) for one in found.cautions),
+            noise=replace(
+                self.noise, reason="" if found.noise is None else sentence_of(NOISE, found.noise, unit)
+            ),
+            cautions=tuple(sentence_of(CAUTIONS, one, unit) for one in found.cautions),
             remarks=(*self.remarks, *(one for one in noted if one not in self.remarks)),
-            model=model and replace(model, notes=tuple(said(PATCH, one) for one in model.differences)),
+            model=model and replace(model, notes=tuple(sentence_of(PATCH, one) for one in model.differences)),
         )
 
     def with_hashes(self, hashes: Mapping[str, str]) -> Self:

@@ -167,7 +167,7 @@ def _kinds(along: Sequence[Path]) -> list[Array]:
         [p.response(m) for p, m in zip(along, moments, strict=True)],
         [p.response(m) for p, m in zip(along, windy, strict=True)],
         [p.response(_in_time(p, r)) for p in along],
-        [p.seen(_reading(p, r)) for p in along],
+        [p.reading_rows(_reading(p, r)) for p in along],
     ]
     found = [*(np.concatenate(kind) for kind in common), block_diag(*[_modulation(p) for p in along])]
     return [columns[:, np.any(columns != 0.0, axis=0)] for columns in found]
@@ -204,7 +204,7 @@ def _modulation(at: Path) -> Array:
     shapes = [size, z.real, z.imag, (z**2 / size).real, (z**2 / size).imag]
     shapes += [(z**3 / size**2).real, (z**3 / size**2).imag]
     slow = _splines(at.time, float(at.time[0]), float(at.time[-1]), 5)
-    return at.seen(_products(np.column_stack(shapes), slow))
+    return at.reading_rows(_products(np.column_stack(shapes), slow))
 
 
 def _splines(values: Array, low: float, high: float, count: int) -> Array:

@@ -144,7 +144,7 @@ class Beside:
         moves: change of the nominal model's coefficients by each set, shape (sets, coefficients).
         noise: variances due to the noise of the readings, of that shape.
         forms: further variances due to the forms of the small causes, of that shape.
-        left: mean scaled residuals over the sets, by run.
+        residuals: scaled, mean over the sets, by run.
         scatter: standard deviations from the scatter of the runs in these residuals, where it exceeds chance,
             shape (coefficients,); else 0.
     """
@@ -153,7 +153,7 @@ class Beside:
     moves: Array
     noise: Array
     forms: Array
-    left: list[Array]
+    residuals: list[Array]
     scatter: Array
 
 
@@ -161,7 +161,7 @@ class Beside:
 class _Cause:
     """One effect beside the fit, at the size at which its change was computed."""
 
-    left: Array  # the change of all readings that the fit cannot absorb, scaled, shape (n,)
+    unabsorbed: Array  # the change of all readings that the fit cannot absorb, scaled, shape (n,)
     moves: Array  # of the coefficients by the part that it absorbs, shape (coefficients,)
     unseen: (
         Array  # their standard deviations from the part of its form that no free decay shows, of that shape
@@ -230,7 +230,7 @@ def beside(fit: Fit, starts: Starts) -> Beside:
             for _ in range(_SECANTS):
                 if start is None or cause is None or start.scaled is None:
                     break
-                size = float(cause.left @ residuals) / float(cause.left @ cause.left)
+                size = float(cause.unabsorbed @ residuals) / float(cause.unabsorbed @ cause.unabsorbed)
                 if not cause.least < size < cause.greatest or size <= 0.0 or abs(size - 1.0) < _SETTLED:
                     break
                 common = start.point.common.copy()
@@ -241,8 +241,8 @@ def beside(fit: Fit, starts: Starts) -> Beside:
     if not causes:
         return replace(alone(fit), scatter=_scatter(fit, influence, fit.residuals))
     # a matrix of all changes would be the largest array of a diagnosis
-    gram = np.array([[one.left @ other.left for other in causes] for one in causes])
-    score = np.array([cause.left @ residuals for cause in causes])
+    gram = np.array([[one.unabsorbed @ other.unabsorbed for other in causes] for one in causes])
+    score = np.array([cause.unabsorbed @ residuals for cause in causes])
     formal = _formal(fit, gradients)
     zero = np.zeros(formal.size)
     steps_taken = [_Step(np.zeros(len(causes)), 0.0, zero, zero, zero)]
@@ -262,7 +262,7 @@ def beside(fit: Fit, starts: Starts) -> Beside:
     weights /= weights.sum()
     mean_sizes = weights @ np.array([step.sizes for step in steps_taken])
     taken = np.split(
-        sum(size * cause.left for size, cause in zip(mean_sizes, causes, strict=True)),
+        sum(size * cause.unabsorbed for size, cause in zip(mean_sizes, causes, strict=True)),
         np.cumsum([residual.size for residual in fit.residuals])[:-1],
     )
     remaining = [residual - part for residual, part in zip(fit.residuals, taken, strict=True)]

@@ -175,7 +175,7 @@ class RunDeviations:
     def products(self) -> RunProducts:
         """Products of the columns of the fit's own differences."""
         deviations = [one[:, self.kept] for one in self.columns.deviations]
-        return RunProducts.of(deviations, self.columns.common, self.columns.seen)
+        return RunProducts.of(deviations, self.columns.common, self.columns.residuals)
 
     @property
     def prior(self) -> WidthPrior:
@@ -218,7 +218,7 @@ class RunDeviations:
         problem = replace(self.fitted.problem, scatter=tuple(self.scatter[place] for place in pair))
         prior = width_prior(problem)
         products = RunProducts.of(
-            [one[:, pair] for one in self.columns.deviations], self.columns.common, self.columns.seen
+            [one[:, pair] for one in self.columns.deviations], self.columns.common, self.columns.residuals
         )
         widths = width_quantiles(products, prior, (_AT_MOST,))[0]
         unseen = prior.usual * 10.0 ** (prior.decades * float(ndtri(_AT_MOST)))
@@ -274,7 +274,7 @@ class RunDeviations:
             return None
         columns, size = self.columns.with_drift(place, values)
         products = RunProducts.of(
-            [one[:, self.kept] for one in columns.deviations], columns.common, columns.seen
+            [one[:, self.kept] for one in columns.deviations], columns.common, columns.residuals
         )
         widths = likeliest_widths(products, self.prior)
         beside = marginal(products, widths)
@@ -310,7 +310,7 @@ class RunDeviations:
         changes, per = self._changes(index), self._per(index)
         deviation = self.columns.deviations[index][:, pair]
         covariance = np.linalg.pinv(deviation.T @ deviation)
-        own = per * (covariance @ (deviation.T @ self.columns.seen[index]))
+        own = per * (covariance @ (deviation.T @ self.columns.residuals[index]))
         std = np.abs(per) * np.sqrt(np.diag(covariance))
         widths = np.array([one.width if k in self.kept else 0.0 for k, one in enumerate(self.scatter)])
         bands = (
@@ -334,7 +334,7 @@ class RunDeviations:
 
     def _p_value(self, index: int) -> float:
         """P-value of a run's deviation given the others, times the number of runs."""
-        count = len(self.columns.seen)
+        count = len(self.columns.residuals)
         if not self.kept or count < _FEWEST:
             return 1.0
         products, pair = self.products, self.alone
@@ -347,7 +347,7 @@ class RunDeviations:
         kept = self.columns.deviations[index][:, self.kept]
         by_chance = covariance @ (own.T @ kept) * widths
         by_common = covariance @ (own.T @ self.columns.common[index])
-        left = self.columns.seen[index] - self.columns.common[index] @ found.common
+        left = self.columns.residuals[index] - self.columns.common[index] @ found.common
         away = covariance @ (own.T @ left)
         whole = covariance + by_chance @ by_chance.T + by_common @ found.covariance @ by_common.T
         distance = float(away @ np.linalg.solve(whole, away)) / _NUMBERS

@@ -165,7 +165,7 @@ def possible_answers(study: Study, kinds: Sequence[type[Effect]]) -> Answers:
     share, alternatives = _by_choice(answer, chosen, probability_of_answer, kinds)
     starts = starts_beside(chosen, kinds)
     small = beside(chosen, starts) if study.causes else None
-    hidden = hidden_effects(chosen, starts, None if small is None else small.left)
+    hidden = hidden_effects(chosen, starts, None if small is None else small.residuals)
     first = Possible(probability_of_answer * share, chosen, answer.textbook_of(chosen), small)
     return Answers((first, *alternatives, *others), unknown, study.nominal, hidden)
 
@@ -411,7 +411,7 @@ def _of_answer(
     place = coefficients_of(fit).index(name)
     misfit = float(small.scatter[place])
     if answer.small is not None:
-        misfit = max(misfit, coefficient_move(replace(fit, residuals=small.left), name))
+        misfit = max(misfit, coefficient_move(replace(fit, residuals=small.residuals), name))
     rounding = unseen = 0.0
     if name.startswith("cn_"):
         rounding = density_rounding(campaign.runs)

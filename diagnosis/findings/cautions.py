@@ -243,7 +243,7 @@ class _Reading:
         return reading_shown(self.value, int(digits), self.unit)
 
 
-def said(sentences: Mapping[str, Sentence], given: Fact, unit: str = "rad") -> str:
+def sentence_of(sentences: Mapping[str, Sentence], given: Fact, unit: str = "rad") -> str:
     """The sentence of a fact of the document.
 
     Args:
@@ -261,6 +261,6 @@ def said(sentences: Mapping[str, Sentence], given: Fact, unit: str = "rad") -> s
 
 
 def remark(given: Noted, unit: str = "rad") -> Remark:
-    """The remark of a fact about the noise, as in `said`."""
+    """The remark of a fact about the noise, as in `sentence_of`."""
     what, remedy = REMARKS[given.fact.kind]
-    return Remark(Outcome.NOTED, given.runs, said({given.fact.kind: what}, given.fact, unit), remedy)
+    return Remark(Outcome.NOTED, given.runs, sentence_of({given.fact.kind: what}, given.fact, unit), remedy)

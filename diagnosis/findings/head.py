@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from diagnosis.findings.candidates import Candidate
-from diagnosis.findings.cautions import CAUTIONS, said
+from diagnosis.findings.cautions import CAUTIONS, sentence_of
 from diagnosis.findings.closure import shares_of_gap
 from diagnosis.findings.disturbed_runs import odd_runs
 from diagnosis.findings.next_steps import next_steps
@@ -276,7 +276,7 @@ def _warnings(answer: Findings) -> Iterator[str]:
             yield str(remark)
     for fact in answer.found.cautions:
         if fact.kind in _CHANGES:
-            yield said(CAUTIONS, fact, answer.misfit.unit)
+            yield sentence_of(CAUTIONS, fact, answer.misfit.unit)
 
 
 _CHANGES = {"not followed", "only one run", "more noise than stated", "zeros apart"}

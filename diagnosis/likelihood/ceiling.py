@@ -113,15 +113,15 @@ class Ridge:
         precision: of the prior, one over the variance of a coefficient, in the basis' units.
     """
 
-    whole: Normal
+    normal: Normal
     precision: float
 
     @cached_property
     def _scaled(self) -> tuple[Array, Array]:
         """Scale of the columns, and the penalised matrix in it."""
-        matrix = self.whole.matrix
+        matrix = self.normal.matrix
         penalty = np.full(len(matrix), self.precision)
-        penalty[: self.whole.free] = 0.0
+        penalty[: self.normal.free] = 0.0
         size = np.sqrt(np.maximum(np.diag(matrix) + penalty, 1e-300))
         scaled = (matrix + np.diag(penalty)) / np.outer(size, size)
         scaled += _TINY * np.eye(len(matrix))
@@ -131,7 +131,7 @@ class Ridge:
     def solution(self) -> Array:
         """Coefficients, shape (c + k,)."""
         size, scaled = self._scaled
-        return np.asarray(np.linalg.solve(scaled, self.whole.gradient / size) / size)
+        return np.asarray(np.linalg.solve(scaled, self.normal.gradient / size) / size)
 
     @cached_property
     def covariance(self) -> Array:
@@ -223,7 +223,7 @@ class Unit:
     def _release(self) -> Array:
         return np.asarray(np.linalg.qr(self.path.release[self.rows])[0])
 
-    def left(self, columns: Array) -> Array:
+    def without_release(self, columns: Array) -> Array:
         """Rows of the unit, its release projected out.
 
         Args:
@@ -275,12 +275,14 @@ class Unexplained:
         sizes = [np.max(np.abs(path.nominal), axis=0) for path in self.paths]
         #: scale of the model's own columns, shape (common,)
         self.size = np.maximum(np.max(sizes, axis=0), 1e-300)
-        self._free = [unit.left(unit.path.nominal / self.size) for unit in self.units]
+        self._free = [unit.without_release(unit.path.nominal / self.size) for unit in self.units]
 
     def normals(self, columns: Sequence[Array]) -> list[Normal]:
         """Normal equations by unit; the columns are by run, shape (rows, k)."""
         return [
-            normal(unit.left(unit.path.residual), unit.left(columns[unit.path.index]), free)
+            normal(
+                unit.without_release(unit.path.residual), unit.without_release(columns[unit.path.index]), free
+            )
             for unit, free in zip(self.units, self._free, strict=True)
         ]
 
@@ -289,7 +291,7 @@ class Unexplained:
         basis = {**COMMON, **SINGLE}[kind]
         if kind in OF_READING:
             reach = self.ranges.angle
-            return [path.seen(basis(path.fitted, self.ranges) * reach) for path in self.paths]
+            return [path.reading_rows(basis(path.fitted, self.ranges) * reach) for path in self.paths]
         return [path.response(basis(path, self.ranges)) for path in self.paths]
 
     @cached_property
@@ -325,8 +327,10 @@ class Unexplained:
 
     def single(self, kind: str) -> Evidence:
         """A kind that differs from run to run; short gaps in a run are predicted from their surroundings."""
-        columns = [unit.left(matrix) for unit, matrix in zip(self.runs, self.columns(kind), strict=True)]
-        residuals = [unit.left(unit.path.residual) for unit in self.runs]
+        columns = [
+            unit.without_release(matrix) for unit, matrix in zip(self.runs, self.columns(kind), strict=True)
+        ]
+        residuals = [unit.without_release(unit.path.residual) for unit in self.runs]
         # one precision of the prior, as in `Ridge`, for units with coefficients of their own
         spectra = [_spectrum(normal(r, c)) for r, c in zip(residuals, columns, strict=True)]
         greatest = max(max(values, default=0.0) for values, _ in spectra)

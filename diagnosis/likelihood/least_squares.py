@@ -133,7 +133,7 @@ class Fit:
         if not self.problem.scatter:
             return self.total
         here = self.columns.at(self.widths, width_prior(self.problem))
-        return self.total + here.found.log_determinant + here.prior_cost
+        return self.total + here.likeliest.log_determinant + here.prior_cost
 
     @property
     def total(self) -> float:

@@ -108,7 +108,7 @@ def apparent(frequency: float | Array, interval: float) -> Array:
     return np.asarray((cycles - np.round(cycles)) / interval, np.float64)
 
 
-def seen(frequency: float | Array, interval: float, duration: float, motion: float) -> np.ndarray:
+def resolvable(frequency: float | Array, interval: float, duration: float, motion: float) -> np.ndarray:
     """Whether samples separate a line from the motion, its harmonics and the ends of the spectrum.
 
     Args:
@@ -123,7 +123,7 @@ def seen(frequency: float | Array, interval: float, duration: float, motion: flo
 
 
 def shown_multiples(frequency: float, interval: float, duration: float, motion: float) -> list[int]:
-    """The multiples of a frequency that are visible (`seen`) and distinct from the lower ones.
+    """The multiples of a frequency that are visible (`resolvable`) and distinct from the lower ones.
 
     Args:
         frequency: of the mains, Hz.
@@ -136,7 +136,7 @@ def shown_multiples(frequency: float, interval: float, duration: float, motion: 
     for multiple in HARMONICS:
         place = abs(float(apparent(multiple * frequency, interval)))
         apart = all(abs(place - other) * duration > 2.0 * _WIDTH for other in taken)
-        if apart and seen(multiple * frequency, interval, duration, motion):
+        if apart and resolvable(multiple * frequency, interval, duration, motion):
             found.append(multiple)
             taken.append(place)
     return found
@@ -229,8 +229,8 @@ class _Pieces:
         return float(np.max(self.power[places], initial=0.0))
 
     def shows(self, frequency: float | Array) -> np.ndarray:
-        """Whether the run separates a line of this frequency from the motion, as `seen`."""
-        return seen(frequency, self.run.interval, self.duration, self.motion)
+        """Whether the run separates a line of this frequency from the motion, as `resolvable`."""
+        return resolvable(frequency, self.run.interval, self.duration, self.motion)
 
     def reach(self, frequency: float) -> float:
         """Search range about a frequency, a share of it; 0 where the line is not sought."""

@@ -380,7 +380,7 @@ def sample_means(chain: EffectChain, motion: Motion, run: RunData, zero: float) 
         motion: at the blocks' ends.
         zero: of the sensor, rad.
     """
-    reading = chain.reading(chain.seen(motion, run.sample_times, run.derivative) + zero)
+    reading = chain.reading(chain.sensed(motion, run.sample_times, run.derivative) + zero)
     return run.means(reading)
 
 

@@ -134,14 +134,14 @@ class Path:
         if run.plain:  # fewer values to filter
             rows = self.rows(moment) / run.noise.scale
             return np.asarray(lfilter(*self._filter(self.group * run.interval), rows, axis=0))
-        return self.seen(lfilter(*self._filter(run.interval), moment, axis=0))
+        return self.reading_rows(lfilter(*self._filter(run.interval), moment, axis=0))
 
     @cached_property
     def group(self) -> int:
         """Blocks averaged into a row."""
         return max(1, round(2.0 * np.pi / (self.omega * self.run.interval * _ROWS)))
 
-    def seen(self, reading: Array) -> Array:
+    def reading_rows(self, reading: Array) -> Array:
         """A change of the reading, in its unit, shape (n, k), as `rows`."""
         return self.rows(self.run.scaled(reading))
 
@@ -166,7 +166,7 @@ class Path:
         if abs(roots[0].imag) < 1e-9:
             free = waves.real
         own = self.rows(self.fit.jacobian[self.index][1][:, 2:])
-        return np.linalg.qr(np.column_stack([self.seen(free), own]))[0]
+        return np.linalg.qr(np.column_stack([self.reading_rows(free), own]))[0]
 
     @cached_property
     def nominal(self) -> Array:

@@ -57,13 +57,13 @@ class ScatterColumns:
         bases: orthonormal columns of a run's other parameters, by run, shape (n, m).
         deviations: by run, shape (n, kinds).
         common: by run, shape (n, common).
-        seen: scaled residuals without the fitted deviations, by run, shape (n,).
+        residuals: scaled, without the fitted deviations, by run, shape (n,).
     """
 
     bases: list[Array]
     deviations: list[Array]
     common: list[Array]
-    seen: list[Array]
+    residuals: list[Array]
 
     @classmethod
     def of(
@@ -91,7 +91,7 @@ class ScatterColumns:
     @cached_property
     def products(self) -> RunProducts:
         """Their products."""
-        return RunProducts.of(self.deviations, self.common, self.seen)
+        return RunProducts.of(self.deviations, self.common, self.residuals)
 
     def with_column(self, change: Sequence[Array]) -> tuple[ScatterColumns, float]:
         """Add a common column; also returns its norm, by which it is scaled.
@@ -103,11 +103,11 @@ class ScatterColumns:
         column = _inside(self.deviations, column)
         size = float(np.sqrt(sum(float(one @ one) for one in column))) or 1.0
         common = [np.column_stack([c, one / size]) for c, one in zip(self.common, column, strict=True)]
-        return ScatterColumns(self.bases, self.deviations, common, self.seen), size
+        return ScatterColumns(self.bases, self.deviations, common, self.residuals), size
 
-    def left(self, found: Marginal) -> list[Array]:
+    def remaining_residuals(self, found: Marginal) -> list[Array]:
         """Residuals at the likeliest parameters and deviations by linear theory, by run, shape (n,)."""
-        rows = zip(self.seen, self.common, self.deviations, found.deviations, strict=True)
+        rows = zip(self.residuals, self.common, self.deviations, found.deviations, strict=True)
         return [z - j @ found.common - d @ e for z, j, d, e in rows]
 
     def with_drift(self, place: int, along: PerRun | None = None) -> tuple[ScatterColumns, float]:
@@ -120,7 +120,7 @@ class ScatterColumns:
         Returns:
             The columns, and the norm of the column for a drift of 1 from the first run to the last.
         """
-        order = np.linspace(-0.5, 0.5, len(self.seen)) if along is None else along
+        order = np.linspace(-0.5, 0.5, len(self.residuals)) if along is None else along
         return self.with_column([t * own[:, place] for t, own in zip(order, self.deviations, strict=True)])
 
     def likeliest(self, prior: WidthPrior, start: PerKind | None = None) -> Between:
@@ -136,7 +136,9 @@ class ScatterColumns:
 
     def wider(self, prior: WidthPrior, widths: PerKind) -> float:
         """P-value of the observed differences if the given widths are true, by the likelihood ratio."""
-        gain = self.at(widths, prior).found.restricted - self.likeliest(prior, widths).found.restricted
+        gain = (
+            self.at(widths, prior).likeliest.restricted - self.likeliest(prior, widths).likeliest.restricted
+        )
         return float(chdtrc(float(widths.size), max(gain, 0.0)))
 
     def at(self, widths: PerKind, prior: WidthPrior) -> Between:
@@ -150,26 +152,26 @@ class Between:
     """The runs with given widths of chance differences.
 
     Args:
-        found: the deviations integrated out.
+        likeliest: the deviations integrated out.
         prior_cost: −2 ln of the prior density of the widths, up to a constant, dimensionless.
         most: the deviations integrated out with the greatest widths, so that all knowledge comes from within
             runs.
     """
 
     widths: PerKind
-    found: Marginal
+    likeliest: Marginal
     prior_cost: float
     most: Marginal
 
     @property
     def likelihood(self) -> float:
         """−2 ln of the likelihood and the prior of the widths, up to a constant."""
-        return self.found.likelihood + self.prior_cost
+        return self.likeliest.likelihood + self.prior_cost
 
     @property
     def restricted(self) -> float:
         """−2 ln of the likelihood with the common parameters integrated out; compares widths."""
-        return self.found.restricted + self.prior_cost
+        return self.likeliest.restricted + self.prior_cost
 
     def shown(self, values: Array, stds: float) -> Kept:
         """Which common parameters differ from zero by the evidence within runs alone.
@@ -199,14 +201,14 @@ class Between:
         """
         identity = np.eye(self.widths.size)
         scaled = identity + self.widths[None, :, None] * deviation_precision * self.widths
-        away = self.found.deviations / self.widths
+        away = self.likeliest.deviations / self.widths
         seen = np.einsum("rk,rkl,rl->", away, identity - np.linalg.inv(scaled), away)
         width = float(np.linalg.slogdet(scaled)[1].sum() + seen)
         if given is None:
-            given = np.zeros(self.found.common.size, bool)
-        for one in (self.found, self.most):  # a parameter that the runs do not determine has no variance
+            given = np.zeros(self.likeliest.common.size, bool)
+        for one in (self.likeliest, self.most):  # a parameter that the runs do not determine has no variance
             given = given & (np.diag(one.covariance) > 0.0)
-        information = self.found.log_information_given(given) - self.most.log_information_given(given)
+        information = self.likeliest.log_information_given(given) - self.most.log_information_given(given)
         return width + self.prior_cost + information
 
 

@@ -201,7 +201,7 @@ def _by_linear_theory(base: Fit, kind: type[Effect], trial: Trial) -> StartingPo
         point = clip(problem, Point(point.common, release))
     place = None if scaled is None else base.point.common.size + scaled
     problem = dataclasses.replace(problem, scatter=added.scatter)
-    left = misfit(base, added.left).excess
+    left = misfit(base, added.residuals).excess
     return StartingPoint(problem, point, drop, left, place, trial.second_order, added.scatter_cost)
 
 
@@ -212,14 +212,14 @@ class _Added:
     Args:
         slope: the best size, as a multiple of the change.
         drop: of −2 ln L, dimensionless.
-        left: residuals, scaled, by run.
+        residuals: scaled, by run.
         scatter: chance differences between the runs, with their likeliest widths beside the change.
         scatter_cost: −2 ln of their evidence, dimensionless.
     """
 
     slope: float
     drop: float
-    left: list[Array]
+    residuals: list[Array]
     scatter: Scatter = ()
     scatter_cost: float = 0.0
 
@@ -244,9 +244,9 @@ def _added_beside_scatter(base: Fit, between: Between, change: list[Array]) -> _
     columns, size = base.columns.with_column(change)
     beside = columns.likeliest(width_prior(base.problem), between.widths)
     return _Added(
-        float(beside.found.common[-1]) / size,
+        float(beside.likeliest.common[-1]) / size,
         between.likelihood - beside.likelihood,
-        columns.left(beside.found),
+        columns.remaining_residuals(beside.likeliest),
         tuple(one.as_wide_as(width) for one, width in zip(base.problem.scatter, beside.widths, strict=True)),
         beside.cost(base.columns.products.own),
     )

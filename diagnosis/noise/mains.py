@@ -286,4 +286,6 @@ def _without_motion(record: Record, window: Array) -> tuple[Callable[[Array], Ar
         return lambda columns: columns * window[:, None], (record.yaw_rad - level) * window
     piece = max(2, round(record.sample_rate / (_KNOTS * motion_frequency(record))))
     curve = SmoothCurve(record.time_s, piece)
-    return lambda columns: curve.left(columns) * window[:, None], curve.left(record.yaw_rad) * window
+    return lambda columns: curve.residuals(columns) * window[:, None], curve.residuals(
+        record.yaw_rad
+    ) * window

@@ -96,7 +96,7 @@ def scattered_variance(record: Record, frequency: float, block: int) -> tuple[fl
     squares, freedom = 0.0, 0.0
     for place in whole or [np.arange(record.time_s.size)]:
         curve = SmoothCurve(record.time_s[place], piece)
-        means = mean_of_blocks(curve.left(record.yaw_rad[place]), block)
+        means = mean_of_blocks(curve.residuals(record.yaw_rad[place]), block)
         squares += float(means @ means)
         freedom += means.size - absorbed * (place.size // piece + _ORDER)
     return block * squares / max(freedom, 1.0), float(np.sqrt(2.0 / max(freedom, 1.0)))
@@ -115,7 +115,7 @@ class SmoothCurve:
         self.time = time
         self.knots = np.concatenate([np.full(_ORDER + 1, time[0]), inner, np.full(_ORDER + 1, time[-1])])
 
-    def left(self, values: Array) -> Array:
+    def residuals(self, values: Array) -> Array:
         """Residuals of the values from the curve, shape (n,) or (n, k)."""
         apart = np.diff(self.time)
         # normal equations are ten times as fast, and lose their digits where samples come in bursts

@@ -207,7 +207,7 @@ def curve(unexplained: Unexplained, evidence: Evidence, similarity: Similarity) 
         "time": np.zeros(size),
     }
     at = Places(**{**still, **grid}, stiffness=r.stiffness, speed=r.speed if kind == "wind" else 0.0)
-    basis, free = COMMON[kind](at, r), evidence.solution.whole.free
+    basis, free = COMMON[kind](at, r), evidence.solution.normal.free
     line = np.column_stack([np.ones(size), *(grid[name] for name in _OVER[kind] if name != "time")])
     own = np.linalg.qr(line)[0]
     rows = basis - own @ (own.T @ basis)
@@ -239,7 +239,7 @@ def events(unexplained: Unexplained, kind: str, precision: float) -> Events:
     drops, spans = [], []
     for unit, columns in zip(unexplained.runs, unexplained.columns(kind), strict=True):
         path = unit.path
-        part = normal(unit.left(path.residual), unit.left(columns))
+        part = normal(unit.without_release(path.residual), unit.without_release(columns))
         solution = Ridge(part, precision).solution
         drops.append(max(part.power - part.cost(solution), 0.0))
         # the shortest interval of time with most of the energy

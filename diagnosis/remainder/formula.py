@@ -209,7 +209,7 @@ def _chosen(unexplained: Unexplained, kind: str, closable: float) -> Formula | N
             "Kr": at.stiffness, "omega": path.still_omega,
         }  # fmt: skip
         values = np.column_stack([np.broadcast_to(term.value(places), at.time.shape) for term in candidates])
-        columns.append(path.seen(values) if of_reading else path.response(values))
+        columns.append(path.reading_rows(values) if of_reading else path.response(values))
     size = np.maximum(np.max([np.max(np.abs(c), axis=0) for c in columns], axis=0), 1e-300)
     parts = unexplained.normals([c / size for c in columns])
     chosen, gained = _paying(unexplained, parts, closable)

@@ -103,7 +103,7 @@ def odd_runs(measured: Campaign, study: Study) -> tuple[Disturbance, ...]:
     found = _explaining([Hypothesis((), nominal), *_sets(study)], nominal, study.prepared.kinds)
     rivals, at_random = list[Hypothesis](), None
     if answer is not None and answer.effects != UNKNOWN:
-        at_random = None if answer.random is None else answer.random.left
+        at_random = None if answer.random is None else answer.random.fitted_set
         rivals = [answer.hypothesis] if answer.hypothesis is not None and at_random is None else []
     rivals += [one for rival in study.rivals for one in rival.hypotheses]
     return _stated(_simplest(found, rivals, nominal, at_random), measured, nominal)

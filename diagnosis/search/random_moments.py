@@ -70,20 +70,20 @@ class RandomAnswer:
         fitted: the fit of these effects, or of none, in the sensor's noise and to runs that repeat. The random
             motion is larger than what the runs differ by, and beside it narrow deviations would pull the common
             parameters.
-        left: the residual. Its share is the excess of the innovations and of the other runs over the nominal
-            excess, the same in every channel.
+        fitted_set: the weighed set. Its share is the excess of the innovations and of the other runs over the
+            nominal excess, the same in every channel.
     """
 
     kinds: tuple[type[Effect], ...]
     process: ProcessNoise
     beside: Hypothesis | None
     fitted: Fit
-    left: FittedSet
+    fitted_set: FittedSet
 
     @property
     def share(self) -> float:
         """Unexplained share of the gap, a fraction."""
-        return self.left.share
+        return self.fitted_set.share
 
     @property
     def effects(self) -> tuple[str, ...]:

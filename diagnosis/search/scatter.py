@@ -260,7 +260,7 @@ def _gain(columns: ScatterColumns, prior: WidthPrior, kept: Kept, lost: Kept) ->
     """Drop of −2 ln L by some of the differences beside the others that are kept."""
     whole = columns.likeliest(_held(prior, ~kept))
     without = columns.likeliest(_held(prior, ~kept | lost))
-    return without.found.restricted - whole.found.restricted
+    return without.likeliest.restricted - whole.likeliest.restricted
 
 
 def _held(prior: WidthPrior, at_least: Kept) -> WidthPrior:

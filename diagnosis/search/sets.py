@@ -45,8 +45,8 @@ class Sets:
         refused: by names of refused answers, the reason: effects that the runs do not confirm.
         unexplained_floor: the least share of the gap that all effects together leave, where that ended the search;
             else None.
-        settled: the answer fitted to whole runs, with every effect confirmed by the runs; None where the answer is
-            not a fitted set, or is not settled yet.
+        confirmed: the answer fitted to whole runs, with every effect confirmed by the runs; None where the answer
+            is not a fitted set, or is not confirmed yet.
     """
 
     view: RunsInView
@@ -55,7 +55,7 @@ class Sets:
     rivals: tuple[FoundRival, ...] = ()
     refused: Mapping[Names, Fact] = field(default_factory=dict)
     unexplained_floor: float | None = None
-    settled: Hypothesis | None = None
+    confirmed: Hypothesis | None = None
 
     @cached_property
     def weighed(self) -> list[Weighed]:
@@ -64,7 +64,7 @@ class Sets:
         sets = [self._fitted_set(one) for one in self.hypotheses]
         outside = (one for rival in self.rivals for one in rival.hypotheses)
         sets += [one.fitted_set(self.view.repeating, nominal, outside=True) for one in outside]
-        sets += [answer.left for answer in self.random]
+        sets += [answer.fitted_set for answer in self.random]
         if prepared.read_off:  # it may be the only cause, and is part of the gap
             sets.append(FittedSet((), 1.0, nominal.excess, scatter_cost=nominal.scatter_cost))
         nominal = replace(nominal, chi2=nominal.chi2 + prepared.hum_power(base))
@@ -146,9 +146,9 @@ class Sets:
         """The answer and its parts fitted to whole runs, by names; None where that fails."""
         names = self.weighed[0].effects
         found = {h.names: self.view.whole(h) for h in self.hypotheses if set(h.names) < set(names)}
-        if self.settled is not None:
+        if self.confirmed is not None:
             at_random = any(moment.effects == names for moment in self.random)
-            found[names] = whole = self.settled if at_random else self.view.finished(self.settled)
+            found[names] = whole = self.confirmed if at_random else self.view.finished(self.confirmed)
             # its parts are compared with it, with the chance differences between runs of the answer
             parts = {key: part for key, part in found.items() if part is not None and key != names}
             for key, part in parts.items():
@@ -209,7 +209,7 @@ def resolved(sets: Sets) -> Sets:
             whole = sets.view.settled(found)
             reason = None if whole is None else refusal(whole.fit)
             if whole is not None and reason is None:
-                return replace(sets, settled=whole)
+                return replace(sets, confirmed=whole)
             sets = sets.without(names, reason)
         else:
             return sets

@@ -76,10 +76,10 @@ class LinkedRuns:
     @cached_property
     def least_squares(self) -> tuple[Array, Array] | None:
         """φ without scatter and its covariance, shape (p, p); None where the runs do not determine it."""
-        return combine(self.linked, np.array(self.seen), self.weights) if self.runs else None
+        return combine(self.linked, np.array(self.coefficients), self.weights) if self.runs else None
 
     @property
-    def seen(self) -> list[Array]:
+    def coefficients(self) -> list[Array]:
         """(a, k, g) without the part of the gain that depends on no unknown, by run, shape (3,), SI."""
         pairs = zip(self.runs, self.gained, strict=True)
         return [one.coefficients - forcing_of(run, 0).fixed for run, one in pairs]
@@ -92,7 +92,7 @@ class LinkedRuns:
     def measured(self, parameters: PerParameter) -> MeasuredRuns:
         """The runs about common parameters."""
         moves = moves_of(self.runs, self.linked, parameters)
-        return MeasuredRuns(self.linked.links, self.seen, self.weights, moves)
+        return MeasuredRuns(self.linked.links, self.coefficients, self.weights, moves)
 
     @cached_property
     def scatter(self) -> ScatterFit | None:

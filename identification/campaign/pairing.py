@@ -121,7 +121,7 @@ def _mean_std(values: Array) -> float:
 def _moved(outcome: Callable[[Array, Array], Array], centre: Array, scatter: ScatterFit) -> list[Array]:
     """Change of the outcome by one standard deviation of each kind of scatter, by kind, shape (q, runs)."""
     every = []
-    values = np.array([seen[:2] for seen in scatter.seen])
+    values = np.array([seen[:2] for seen in scatter.values])
     for kind in range(len(scatter.names)):
         columns = []
         for place, move in enumerate(scatter.moves):

@@ -74,19 +74,19 @@ class MeasuredRuns:
 
     Args:
         links: by run, shape (m, p), from the common parameters φ to (a, k, g).
-        seen: by run, shape (m,).
+        values: (a, k, g) by run, shape (m,).
         weights: inverse covariance of its noise by run, shape (m, m).
         moves: by run, derivative to the relative size of each of `SCATTERED`, shape (m, 3).
     """
 
     links: Sequence[Array]
-    seen: Sequence[Array]
+    values: Sequence[Array]
     weights: Sequence[Array]
     moves: Sequence[Array]
 
     def misfit(self, parameters: Array) -> float:
         """χ² of common parameters, shape (p,), without scatter."""
-        away = [seen - link @ parameters for seen, link in zip(self.seen, self.links, strict=True)]
+        away = [seen - link @ parameters for seen, link in zip(self.values, self.links, strict=True)]
         return sum(float(one @ weight @ one) for one, weight in zip(away, self.weights, strict=True))
 
     def floored(self, least: Array) -> MeasuredRuns:
@@ -111,7 +111,7 @@ class MeasuredRuns:
         Args:
             used: places of the deviations in `SCATTERED`, shape (k,).
         """
-        rows = zip(self.links, self.seen, self.weights, self.moves, strict=True)
+        rows = zip(self.links, self.values, self.weights, self.moves, strict=True)
         of_runs = [(j, z - j @ start, w, d[:, used]) for j, z, w, d in rows]
         return RunProducts(
             np.stack([d.T @ w @ d for _, _, w, d in of_runs]),
@@ -136,7 +136,7 @@ class ScatterFit:
         quadratic: χ² with the likeliest deviations, dimensionless.
         gains: by run, how φ depends on its values, shape (p, m).
         moves: by run, of one standard deviation of each, shape (m, k).
-        seen: by run, its values, shape (m,).
+        values: by run, shape (m,).
     """
 
     names: tuple[str, ...]
@@ -148,7 +148,7 @@ class ScatterFit:
     quadratic: float
     gains: Sequence[Array]
     moves: Sequence[Array]
-    seen: Sequence[Array]
+    values: Sequence[Array]
 
     @property
     def covariance(self) -> Array:
@@ -216,7 +216,7 @@ class ScatterFit:
             std = 0.0 if name in self.stated else width * deviation
             widths[name] = Quantity(width, std, "1", None if name in self.stated else ends)
         spread = np.array([np.sum(move[:2] ** 2, axis=1) for move in self.moves])  # of (a, k)
-        sizes = np.array([seen[:2] for seen in self.seen]) ** 2
+        sizes = np.array([seen[:2] for seen in self.values]) ** 2
         shares = np.divide(spread, sizes, out=np.zeros_like(spread), where=sizes > 0.0)
         relative = np.sqrt(shares.sum(axis=0) / np.maximum((sizes > 0.0).sum(axis=0), 1))
         return RunScatter(
@@ -276,7 +276,7 @@ def scatter_between(
         found.quadratic,
         gains,
         moves,
-        measured.seen,
+        measured.values,
     )
 
 

@@ -130,8 +130,8 @@ def examine(campaign: Campaign) -> Examined:
     Raises:
         TunnelError: when a wind-on run states no air density, or a stated value is out of range.
     """
-    kept, remarks, seen = measured(campaign)
-    return Examined(kept, (*remarks, *(() if seen is None else found_in(seen))))
+    kept, remarks, evidence = measured(campaign)
+    return Examined(kept, (*remarks, *(() if evidence is None else found_in(evidence))))
 
 
 def measured(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...], SlipEvidence | None]:
@@ -163,11 +163,11 @@ def measured(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...], SlipEvid
     kept, excited = self_excited_runs(kept)
     kept, zeros = with_zeros(kept)
     swings = tuple(swing for run in kept.runs if (swing := swing_of(run)) is not None)
-    seen = SlipEvidence(kept, campaign, swings)
+    evidence = SlipEvidence(kept, campaign, swings)
     if driven:
         found = {run.id: run for run in (*kept.runs, *driven)}
         kept = replace(kept, runs=tuple(found[name] for name in order if name in found))
-    return kept, (*faults, *noted, *clocks, *releases, *rests, *excited, *zeros), seen
+    return kept, (*faults, *noted, *clocks, *releases, *rests, *excited, *zeros), evidence
 
 
 def from_releases(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:

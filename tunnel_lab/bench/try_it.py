@@ -126,7 +126,7 @@ class TryItPage:
                     if self._chart.is_deleted:  # the page was left
                         return
                     self._chart.show([time.tolist(), nominal.tolist(), seen.tolist()])
-                    self._words.set_text(said(shown, time, nominal, seen))
+                    self._words.set_text(trial_sentence(shown, time, nominal, seen))
                     self._car.show(time[::4].tolist(), seen[::4].tolist())
         finally:
             self._busy = False
@@ -242,7 +242,7 @@ def effect_words(trial: RigTrial) -> list[str]:
     return ["--effect", f"{effect.name}:{values}"]
 
 
-def said(trial: RigTrial, time: Array, nominal: Array, seen: Array) -> str:
+def trial_sentence(trial: RigTrial, time: Array, nominal: Array, seen: Array) -> str:
     """A sentence on the result of the trial.
 
     Args:

@@ -46,14 +46,14 @@ class Workers(Protocol):
         """Yield every task with its result, in the order of completion."""
 
 
-def said(line: str) -> None:
+def say_on_stderr(line: str) -> None:
     """Print a line about the workers on standard error."""
     from tunnel_lab.terminal.outputs import say  # only here: worker processes start with this module
 
     say(f"tunnel: {line}", stderr=True)
 
 
-def processes(jobs: int, say: Say = said) -> Workers:
+def processes(jobs: int, say: Say = say_on_stderr) -> Workers:
     """Processes of this machine; 0 jobs: this process. The tasks of a process that dies are repeated."""
 
     def workers(
@@ -103,7 +103,7 @@ def crew(
     count = available_processors() if usual is None else usual
     count = count if jobs is None else jobs
     count = count if tasks is None else min(count, tasks)
-    return processes(count) if scheduler is None else on_cluster(scheduler, max(count, 1), said)
+    return processes(count) if scheduler is None else on_cluster(scheduler, max(count, 1), say_on_stderr)
 
 
 def on_cluster(address: str, workers: int, say: Say, *, poll_s: float = POLL_S) -> Workers:

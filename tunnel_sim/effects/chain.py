@@ -73,7 +73,7 @@ class EffectChain:
                 time_s = effect.on_time(time_s, self.stated, drawn)
         return time_s
 
-    def seen(self, motion: Motion, time_s: Array, derivative: int = 0) -> Array:
+    def sensed(self, motion: Motion, time_s: Array, derivative: int = 0) -> Array:
         """The sensor's view of a motion, before its zero and noise.
 
         Args:
@@ -192,7 +192,7 @@ def read_motion(
     angle, time = motion.angle, motion.time_s
     if chain is not None and chain.skips:
         time = time[: round(chain.stated.duration / (time[1] - time[0]))]
-        angle = chain.seen(motion, time)
+        angle = chain.sensed(motion, time)
     elif chain is not None:
         angle = chain.angle(angle, time)
     sensor = sensor if chain is None else chain.sensor(sensor)

@@ -146,7 +146,7 @@ class AfterBeginnings(View):
         del prepared, clock
         if known is None or not isinstance(known.view, Beginnings):
             return None
-        if not known.view.holds(known.answer, known.settled):
+        if not known.view.holds(known.answer, known.confirmed):
             return None
         return cls(known.view.prepared, known.view.prepared.nominal, known)
 
@@ -165,6 +165,6 @@ class AfterBeginnings(View):
     def settled(self, hypothesis: Hypothesis) -> Hypothesis | None:
         """The set with its forms of the beginnings."""
         known, begun = self.known, self.known.fitted(hypothesis.names)
-        if known.settled is not None and known.settled.names == hypothesis.names:
-            return known.settled
+        if known.confirmed is not None and known.confirmed.names == hypothesis.names:
+            return known.confirmed
         return polish(hypothesis) if begun is None else known.view.settled(begun)

@@ -72,7 +72,7 @@ class WholeRuns(View):
     @classmethod
     def after(cls, prepared: Prepared, known: Sets | None, clock: StepClock) -> Self | None:
         """The first view, or one after a view whose answer does not hold in whole runs, or whose runs differ."""
-        holds = known is not None and known.view.holds(known.answer, known.settled)
+        holds = known is not None and known.view.holds(known.answer, known.confirmed)
         with clock.step("effects"):
             others = () if known is None else known.view.of_differing_runs(known.likely)
             if holds and not others:

@@ -37,5 +37,5 @@ class StatementSlip(ABC):
     """A statement that the measured oscillations contradict."""
 
     @abstractmethod
-    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
+    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
         """A remark for each contradicted statement; none where all may be right."""

@@ -37,13 +37,13 @@ class Labels:
     Args:
         spring: stated Kr, shape (n,), N m/rad.
         pressure: stated ½ρV², shape (n,), Pa.
-        seen: k = ωn², shape (n,), 1/s².
+        stiffness: k = ωn², shape (n,), 1/s².
         std: standard deviation of k, shape (n,), 1/s².
     """
 
     spring: Array
     pressure: Array
-    seen: Array
+    stiffness: Array
     std: Array
 
     @classmethod
@@ -77,9 +77,9 @@ class _Misfit:
 class LabelsExchanged(StatementSlip):
     """Springs or wind speeds of two runs, or of all runs of two settings, are exchanged. Refused."""
 
-    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
+    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
         """Exchange the labels of runs that fit badly with all others' labels."""
-        known = [swing for swing in seen.swings if swing.run.spring_stiffness is not None]
+        known = [swing for swing in evidence.swings if swing.run.spring_stiffness is not None]
         if len(known) < _LEAST_RUNS:
             return ()
         labels = Labels.of(known)
@@ -130,7 +130,7 @@ def _fitted(
     labels: Labels, used: NDArray[np.bool_], *, common: bool = False
 ) -> tuple[float, float | None] | None:
     """Izz and C of Kr = Izz k + C ½ρV², or with a common stiffness added; None where they cannot be separated."""
-    spring, seen, pressure = labels.spring[used], labels.seen[used], labels.pressure[used]
+    spring, seen, pressure = labels.spring[used], labels.stiffness[used], labels.pressure[used]
     windy = bool(np.any(pressure > 0.0))
     columns = [seen, *([pressure] * windy), *([np.ones_like(seen)] * common)]
     scaled = np.column_stack(columns) / spring[:, None]  # errors of springs are relative
@@ -152,21 +152,25 @@ def _misfit(labels: Labels, what: str) -> tuple[_Misfit, Array]:
     """
     springs, place, count = np.unique(labels.spring, return_inverse=True, return_counts=True)
     if what == _SPRINGS:
-        columns, target = labels.seen[:, None], labels.spring
+        columns, target = labels.stiffness[:, None], labels.spring
         if np.any(labels.pressure > 0.0):
             columns = np.column_stack((columns, labels.pressure))
         std = (
             labels.spring
-            * np.hypot(policy.SPRING_TOLERANCE, labels.std / labels.seen)
+            * np.hypot(policy.SPRING_TOLERANCE, labels.std / labels.stiffness)
             * np.sqrt(count[place])
         )
         freedom = springs.size - 1
     else:
-        columns, target, std = np.zeros((labels.seen.size, springs.size + 1)), labels.seen, labels.std
-        columns[np.arange(labels.seen.size), place] = 1.0
+        columns, target, std = (
+            np.zeros((labels.stiffness.size, springs.size + 1)),
+            labels.stiffness,
+            labels.std,
+        )
+        columns[np.arange(labels.stiffness.size), place] = 1.0
         columns[:, -1] = labels.pressure
         rank = np.linalg.matrix_rank(columns / np.maximum(columns.max(axis=0), 1e-300))
-        freedom = labels.seen.size - int(rank)
+        freedom = labels.stiffness.size - int(rank)
     columns, target = columns / std[:, None], target / std
     scale = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     solution = np.linalg.lstsq(columns / scale, target, rcond=1e-10)[0]
@@ -277,15 +281,15 @@ class _Springs:
 class SpringsRenumbered(StatementSlip):
     """All springs are one number off, in the campaign's own order or in the packaged list. Refused."""
 
-    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
+    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
         """Take each spring for its neighbour in a list; not where the campaign states that its values are right."""
-        if seen.campaign.sensor.plausible is False:
+        if evidence.campaign.sensor.plausible is False:
             return ()
-        still = [s for s in seen.swings if not s.run.wind_on and s.run.spring_stiffness is not None]
+        still = [s for s in evidence.swings if not s.run.wind_on and s.run.spring_stiffness is not None]
         stated = _Springs.of(still)
         if stated.stiffness.size < 2 or np.ptp(stated.inertia) < np.log1p(policy.OTHER_NUMBER):
             return ()
-        own = sorted({float(s.run.spring_stiffness or 0.0) for s in seen.swings})
+        own = sorted({float(s.run.spring_stiffness or 0.0) for s in evidence.swings})
         for table in (np.array(list(load_rig().springs.values())), np.array(own)):
             places = [
                 np.flatnonzero(np.abs(table / value - 1.0) < policy.SPRING_AT_BEST)
@@ -328,18 +332,18 @@ def _renumbered(stated: _Springs, inside: NDArray[np.bool_], meant: Array, shift
 class SpringOffTheLine(StatementSlip):
     """A spring that, according to the others, is not as stiff as stated. Noted."""
 
-    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
+    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
         """Compare the stated stiffnesses with the wind-off frequencies, within the tolerance of springs.
 
         One remark: on the wrong spring if three or more springs identify it, else on all of them.
         """
-        still = [s for s in seen.swings if not s.run.wind_on and s.run.spring_stiffness is not None]
+        still = [s for s in evidence.swings if not s.run.wind_on and s.run.spring_stiffness is not None]
         if len({s.run.spring_stiffness for s in still}) < 2:
             return ()
         springs = _Springs.of(still)
         if not springs.disagree():
             return ()
-        fits = _other_fits(seen.swings)
+        fits = _other_fits(evidence.swings)
         figures = {"inertias_kg_m2": [one for one, _ in fits], "air_stiffnesses_m3": [air for _, air in fits]}
         # The spring that differs beyond chance while the others agree.
         count, scores = springs.stiffness.size, []
@@ -374,13 +378,13 @@ class SpringOffTheLine(StatementSlip):
 class InertiaOffTheSprings(StatementSlip):
     """A stated inertia that the springs contradict. Noted."""
 
-    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
+    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
         """Compare the stated inertia with the wind-off runs'; a nominal inertia may be off a little.
 
         The remark names the probable error of units; there is none where the campaign states ``plausible = false``.
         """
-        campaign = seen.campaign
-        still = [s for s in seen.swings if not s.run.wind_on and s.run.spring_stiffness is not None]
+        campaign = evidence.campaign
+        still = [s for s in evidence.swings if not s.run.wind_on and s.run.spring_stiffness is not None]
         stated = campaign.rig.yaw_inertia
         if stated is None or not still or campaign.sensor.plausible is False:
             return ()

@@ -49,15 +49,15 @@ class WrongFactor(StatementSlip):
     Refused; asked about where the evidence is weaker.
     """
 
-    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
+    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
         """Try factors on every run, on groups and along the campaign; labels that agree as well go first."""
-        swings = [s for s in seen.swings if s.run.spring_stiffness and s.rate > 0.0 and s.stiffness > 0.0]
+        swings = [s for s in evidence.swings if s.run.spring_stiffness and s.rate > 0.0 and s.stiffness > 0.0]
         if len(swings) < _FEWEST:
             return ()
         motions = MeasuredMotions.of(swings)
         found = _agreeing(motions)
         best = min(found, key=lambda one: one.fit.squares(one.level), default=None)
-        if best is None or _labels_agree(seen, motions, best):
+        if best is None or _labels_agree(evidence, motions, best):
             return ()
         return _said(motions, found)
 
@@ -146,10 +146,10 @@ def _judged(trial: TrialSlip, fit: ConditionsFit, effects: Sequence[ConditionsFi
     return None
 
 
-def _labels_agree(seen: SlipEvidence, m: MeasuredMotions, best: _Found) -> bool:
+def _labels_agree(evidence: SlipEvidence, m: MeasuredMotions, best: _Found) -> bool:
     """Whether another label of a run, or an exchange, agrees as well as the best factor."""
     limit = best.fit.squares(best.level) + float(chdtri(1, policy.DIFFERENCE_RATE))
-    for labels in mending_statements(seen):
+    for labels in mending_statements(evidence):
         if labels.speed.size != m.stated.size:
             continue
         conditions = replace(m.conditions, speed=labels.speed, density=labels.density, clock=labels.clock)

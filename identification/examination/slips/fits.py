@@ -65,7 +65,7 @@ class Statements:
         )
 
     @property
-    def seen(self) -> Array:
+    def stiffness(self) -> Array:
         """K by the true times, shape (n,), 1/s²."""
         return np.asarray(self.recorded * self.clock**2)
 
@@ -125,7 +125,7 @@ def agreement(
         of_speed: relative tolerance of a wind speed, dimensionless.
     """
     settings, place = _settings(labels.spring)
-    seen, pressure, springs = labels.seen, labels.pressure, settings.size
+    seen, pressure, springs = labels.stiffness, labels.pressure, settings.size
     count, windy = seen.size, bool(np.any(labels.speed > 0.0))
     usual = float(np.median(seen / labels.spring))
     least = np.full(springs, np.inf)

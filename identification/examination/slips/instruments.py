@@ -51,10 +51,10 @@ class DriftingClock(StatementSlip):
     A single run whose phase may as well jump at one instant is not refused: it may have been disturbed.
     """
 
-    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
+    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
         """Fit a drift of the clock, and powers of the amplitude, to the phases of all free decays of angles."""
-        phases = [phase for swing in seen.swings if (phase := _phase(swing)) is not None]
-        still = {swing.run.id for swing in seen.swings if not swing.run.wind_on}
+        phases = [phase for swing in evidence.swings if (phase := _phase(swing)) is not None]
+        still = {swing.run.id for swing in evidence.swings if not swing.run.wind_on}
         # one decay does not separate time from amplitude, and without wind-off runs the wind speed may drift
         if len(phases) < 2 or not any(phase.run in still for phase in phases):
             return ()
@@ -203,15 +203,15 @@ class CoupledSensor(StatementSlip):
     the centre, but without the lead; a drift does not end at zero.
     """
 
-    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
+    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
         """Fit a decaying centre to every free decay of an angle; most runs that have one must agree."""
-        if seen.campaign.sensor.derivative or not seen.swings:
+        if evidence.campaign.sensor.derivative or not evidence.swings:
             return ()
-        decaying = [one for swing in seen.swings if (one := _decaying(swing)) is not None]
+        decaying = [one for swing in evidence.swings if (one := _decaying(swing)) is not None]
         found = [one for one in decaying if one.coupled]
         if 2 * len(found) <= len(decaying):  # one sensor reads all runs; beside a drift some lead by chance
             return ()
-        if len(found) == 1 < len(seen.swings) and found[0].constant < _LASTING * found[0].period:
+        if len(found) == 1 < len(evidence.swings) and found[0].constant < _LASTING * found[0].period:
             return ()
         constant = float(np.median([one.constant for one in found]))
         what = (

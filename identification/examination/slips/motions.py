@@ -133,14 +133,14 @@ class ConditionsFit:
     """
 
     number: float
-    left: Vector
+    residuals: Vector
     std: Vector
     chance: Vector
     freedom: int
 
     def squares(self, level: float) -> float:
         """Sum of squares in standard deviations, where the runs scatter by ``level`` times the usual."""
-        return float(np.sum(self.left**2 / (self.std**2 + (level * self.chance) ** 2)))
+        return float(np.sum(self.residuals**2 / (self.std**2 + (level * self.chance) ** 2)))
 
     def level(self) -> float:
         """Level of the scatter that explains the residuals, within the bounds of scatter."""

@@ -45,9 +45,9 @@ class OddGain(StatementSlip):
     noise of the sensor by the same factor as the swing, and a release does not.
     """
 
-    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
+    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
         """Compare noise and swing of every run with the other runs."""
-        found = other_gain(seen)
+        found = other_gain(evidence)
         if found is None:
             return ()
         what = (
@@ -61,12 +61,14 @@ class OddGain(StatementSlip):
         return (Remark(Outcome.NOTED, (found.run.id,), what, remedy),)
 
 
-def other_gain(seen: SlipEvidence) -> OtherGain | None:
+def other_gain(evidence: SlipEvidence) -> OtherGain | None:
     """The one run with another gain; None where there is none, or where several runs may have one."""
-    swings = [s for s in seen.swings if s.run.release_angle and s.run.record.time_s.size >= _LEAST_SAMPLES]
+    swings = [
+        s for s in evidence.swings if s.run.release_angle and s.run.record.time_s.size >= _LEAST_SAMPLES
+    ]
     if len(swings) < _FEWEST_RELEASED:
         return None
-    order, step = seen.campaign.sensor.derivative, seen.campaign.sensor.resolution or 0.0
+    order, step = evidence.campaign.sensor.derivative, evidence.campaign.sensor.resolution or 0.0
     reach = np.array(
         [s.amplitude * s.stiffness ** (-0.5 * order) / abs(s.run.release_angle or 1.0) for s in swings]
     )
@@ -165,20 +167,20 @@ class OddNoise(StatementSlip):
     A run with far less noise is refused: a filter smooths its start, which looks like other oscillations.
     """
 
-    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
+    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
         """Compare the median power of all runs in octaves above the motion; a line of hum does not change it.
 
         The wind may add noise: a run is compared with others of as much wind, or as little. `OddGain` names a run
         of another gain.
         """
-        if len(seen.swings) < _FEWEST_COMPARED or other_gain(seen) is not None:
+        if len(evidence.swings) < _FEWEST_COMPARED or other_gain(evidence) is not None:
             return ()
-        bands, power = _powers(seen.swings)
+        bands, power = _powers(evidence.swings)
         if not bands.size:
             return ()
         logs = 0.5 * np.log(power)
-        pressure = np.array([(s.run.air_density or 0.0) * s.run.wind_speed**2 for s in seen.swings])
-        for place, swing in enumerate(seen.swings):
+        pressure = np.array([(s.run.air_density or 0.0) * s.run.wind_speed**2 for s in evidence.swings])
+        for place, swing in enumerate(evidence.swings):
             others, winds = np.delete(logs, place, axis=0), np.delete(pressure, place)
             spread = np.ptp(others, axis=0)
             if np.any(spread > np.log(_SPREAD)):
@@ -245,10 +247,10 @@ class MirroredRun(StatementSlip):
     mirrored run, and the release angle, where it is stated.
     """
 
-    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
+    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
         """Compare the zeros of all runs as stated and with some signs inverted."""
-        swings = seen.swings
-        if len(swings) < _FEWEST_SIDES or seen.stated.sensor.zero == "per_run":
+        swings = evidence.swings
+        if len(swings) < _FEWEST_SIDES or evidence.stated.sensor.zero == "per_run":
             return ()
         zeros = np.array([swing.zero for swing in swings])
         std = np.array([max(swing.zero_std, 1e-300) for swing in swings])
@@ -272,8 +274,8 @@ class MirroredRun(StatementSlip):
         ids = names + rest if halves else names
         who = "half of the runs (" + ", ".join(names) + ")" if halves else "the reading"
         what = (
-            f"{who} {'swing' if halves else 'swings'} about {_signed(swings, odd)} {seen.campaign.sensor.unit} and "
-            f"the others about {_signed(swings, ~odd)}: the sign of the sensor is inverted between them"
+            f"{who} {'swing' if halves else 'swings'} about {_signed(swings, odd)} {evidence.campaign.sensor.unit} "
+            f"and the others about {_signed(swings, ~odd)}: the sign of the sensor is inverted between them"
         )
         return (
             Remark(
@@ -307,12 +309,12 @@ def _of_wind(swings: tuple[Swing, ...], odd: NDArray[np.bool_]) -> bool:
 class ReleaseOnTheOtherSide(StatementSlip):
     """A stated release angle of the opposite sign to the record. Asked about: no answer depends on it."""
 
-    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
+    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
         """Compare sides where the record begins at its turning point, and the angle is stated."""
-        if seen.campaign.sensor.derivative:
+        if evidence.campaign.sensor.derivative:
             return ()
         ids = []
-        for swing in seen.swings:
+        for swing in evidence.swings:
             stated, first = swing.run.release_angle or 0.0, float(swing.motion[0])
             turning = abs(first) > policy.CLEAR_RELEASE * swing.amplitude
             decays = swing.rate > policy.MISFIT_DEVIATIONS * swing.rate_std
@@ -337,15 +339,15 @@ class AngleInDegrees(StatementSlip):
     The fewer runs are the wrong ones. Of as many large as small ones either may be wrong.
     """
 
-    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
+    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
         """Compare amplitudes and, where they differ much, the noise."""
-        if len(seen.swings) < 2 or seen.campaign.sensor.plausible is False:
+        if len(evidence.swings) < 2 or evidence.campaign.sensor.plausible is False:
             return ()
-        amplitudes = np.array([swing.amplitude for swing in seen.swings])
+        amplitudes = np.array([swing.amplitude for swing in evidence.swings])
         large = amplitudes > _SUSPICIOUS * float(amplitudes.min())
         if not large.any():
             return ()
-        noise = np.array([measured_noise(swing.run.record)[0] for swing in seen.swings])
+        noise = np.array([measured_noise(swing.run.record)[0] for swing in evidence.swings])
         ratio = float(np.median(noise[large]) / np.median(noise[~large]))
         alike = [
             np.abs(noise[some] / np.median(noise[some]) - 1.0) < policy.NOISE_RATIO
@@ -354,7 +356,7 @@ class AngleInDegrees(StatementSlip):
         if abs(ratio / _DEGREES - 1.0) > policy.NOISE_RATIO or not all(np.all(one) for one in alike):
             return ()
         ids = [
-            tuple(s.run.id for s, one in zip(seen.swings, some, strict=True) if one)
+            tuple(s.run.id for s, one in zip(evidence.swings, some, strict=True) if one)
             for some in (large, ~large)
         ]
         exceed = f"amplitude and noise exceed those of the other runs, by {ratio:.3g} times: degrees"

@@ -230,9 +230,9 @@ class WrongLabel(StatementSlip):
 
     labels: tuple[Label, ...] = LABELS
 
-    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
+    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
         """Try every label of every run."""
-        return _found(seen, self.trials)
+        return _found(evidence, self.trials)
 
     def trials(self, statements: Statements, suspects: Sequence[int]) -> Iterator[_Trial]:
         """Every label of every suspect."""
@@ -247,9 +247,9 @@ class WrongLabels(StatementSlip):
 
     labels: tuple[Label, ...] = LABELS
 
-    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
+    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
         """Try all exchanges, and every label of every setting and of every pair."""
-        return _found(seen, self.trials)
+        return _found(evidence, self.trials)
 
     def trials(self, statements: Statements, suspects: Sequence[int]) -> Iterator[_Trial]:
         """All exchanges, and every label of every setting and of every pair of suspects."""
@@ -281,15 +281,15 @@ def _settings(statements: Statements, key: str) -> list[tuple[int, ...]]:
     return [tuple(np.flatnonzero(values == value).tolist()) for value in np.unique(values)]
 
 
-def mending_statements(seen: SlipEvidence) -> list[Statements]:
+def mending_statements(evidence: SlipEvidence) -> list[Statements]:
     """Statements with other labels that the frequencies agree with, of the runs that state a spring."""
     slips = (WrongLabel(), WrongLabels())
-    return [trial.labels for slip in slips for trial, _ in _mended(seen, slip.trials)[1]]
+    return [trial.labels for slip in slips for trial, _ in _mended(evidence, slip.trials)[1]]
 
 
-def _mended(seen: SlipEvidence, trials: Trials) -> tuple[Statements | None, list[tuple[_Trial, float]]]:
+def _mended(evidence: SlipEvidence, trials: Trials) -> tuple[Statements | None, list[tuple[_Trial, float]]]:
     """The stated labels, and the trials that agree, each with its sum of squares."""
-    swings = [swing for swing in seen.swings if swing.run.spring_stiffness]
+    swings = [swing for swing in evidence.swings if swing.run.spring_stiffness]
     if len(swings) < _FEWEST:
         return None, []
     statements = Statements.of(swings)
@@ -309,9 +309,9 @@ def _mended(seen: SlipEvidence, trials: Trials) -> tuple[Statements | None, list
     return statements, mended
 
 
-def _found(seen: SlipEvidence, trials: Trials) -> tuple[Remark, ...]:
+def _found(evidence: SlipEvidence, trials: Trials) -> tuple[Remark, ...]:
     """A refusal that names the runs; none where the statements may be right, or no slip agrees."""
-    statements, mended = _mended(seen, trials)
+    statements, mended = _mended(evidence, trials)
     if statements is None or not mended:
         return ()
     limit = min(squares for _, squares in mended) + _TIE

@@ -20,9 +20,9 @@ from tunnel_sim.vocabulary.campaign import speed_groups
 class MotionGrows(StatementSlip):
     """Motion that grows with the wind off. Refused."""
 
-    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
+    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
         """As `growing_runs`."""
-        return growing_runs(seen.swings)
+        return growing_runs(evidence.swings)
 
 
 @dataclass(frozen=True)
@@ -32,11 +32,11 @@ class EqualStatementsDiffer(StatementSlip):
     This includes labels copied from run to run. The values on which the runs would agree are not known.
     """
 
-    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
+    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
         """Compare the runs that state the same, with equal amplitudes."""
         groups: dict[tuple[float | None, ...], list[Swing]] = defaultdict(list)
-        setting = speed_groups(swing.run.wind_speed for swing in seen.swings)
-        for swing in seen.swings:
+        setting = speed_groups(swing.run.wind_speed for swing in evidence.swings)
+        for swing in evidence.swings:
             run = swing.run
             if run.spring_stiffness and swing.rate > 0.0:
                 speed = setting[run.wind_speed]
@@ -121,9 +121,9 @@ def _changes(swings: tuple[Swing, ...]) -> list[_Change]:
 class WindNotSeen(StatementSlip):
     """No wind-on run differs from the wind-off runs of its spring, though records would show it. Asked about."""
 
-    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
+    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
         """Compare frequency and decay rate with the wind on and off."""
-        changes = _changes(seen.swings)
+        changes = _changes(evidence.swings)
         if not changes:
             return ()
         for change in changes:
@@ -153,9 +153,9 @@ class WindExchanged(StatementSlip):
     Refused where the springs agree after an exchange: either sign alone may be an effect.
     """
 
-    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
+    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
         """Exchange wind on and off in all runs, where there is one speed."""
-        swings = tuple(s for s in seen.swings if s.run.spring_stiffness)
+        swings = tuple(s for s in evidence.swings if s.run.spring_stiffness)
         speeds = set(speed_groups(s.run.wind_speed for s in swings if s.run.wind_on).values())
         changes = _changes(swings)
         if len(speeds) != 1 or len({c.swing.run.spring_stiffness for c in changes}) == 1:
@@ -199,18 +199,18 @@ _OF_DENSITY = {
 class YawMomentTooLarge(StatementSlip):
     """|Cnβ| too large for any body: a stiffness, a speed or a size in a wrong unit. Asked about."""
 
-    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
+    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
         """Compare Cnβ of the runs with the greatest."""
-        area, length = seen.campaign.rig.frontal_area, seen.campaign.rig.reference_length
-        swings = [s for s in seen.swings if s.run.spring_stiffness]
+        area, length = evidence.campaign.rig.frontal_area, evidence.campaign.rig.reference_length
+        swings = [s for s in evidence.swings if s.run.spring_stiffness]
         windy = [s.run.id for s in swings if s.run.wind_on]
-        if not windy or area is None or length is None or not _judged(seen):
+        if not windy or area is None or length is None or not _judged(evidence):
             return ()
         found = agreement(Statements.of(swings))
         if found.freedom < 0 or not found.inverse_inertia > 0.0:
             return ()
         # a stated inertia that contradicts the springs has its own remark
-        inertia = min(seen.campaign.rig.yaw_inertia or np.inf, 1.0 / found.inverse_inertia)
+        inertia = min(evidence.campaign.rig.yaw_inertia or np.inf, 1.0 / found.inverse_inertia)
         scale = area * length / inertia
         value, std = found.air / scale, found.air_std / scale
         if abs(value) - policy.MISFIT_DEVIATIONS * std <= policy.GREATEST_YAW_MOMENT:
@@ -231,12 +231,12 @@ class InertiaOfNoBody(StatementSlip):
     A stated inertia is compared instead where there is one: it is closer.
     """
 
-    def find(self, seen: SlipEvidence) -> tuple[Remark, ...]:
+    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
         """Compare 12 Izz/(A l³), the density of a uniform rod of these sizes, with the densities of bodies."""
-        area, length = seen.campaign.rig.frontal_area, seen.campaign.rig.reference_length
-        still = [s for s in seen.swings if s.run.spring_stiffness and not s.run.wind_on]
-        stated = seen.campaign.rig.yaw_inertia is not None
-        if stated or not still or area is None or length is None or not _judged(seen):
+        area, length = evidence.campaign.rig.frontal_area, evidence.campaign.rig.reference_length
+        still = [s for s in evidence.swings if s.run.spring_stiffness and not s.run.wind_on]
+        stated = evidence.campaign.rig.yaw_inertia is not None
+        if stated or not still or area is None or length is None or not _judged(evidence):
             return ()
         inertia = float(np.median([(s.run.spring_stiffness or 0.0) / s.stiffness for s in still]))
         density = _SLENDER * inertia / (area * length**3)
@@ -253,6 +253,6 @@ class InertiaOfNoBody(StatementSlip):
         return (Remark(Outcome.NOTED, tuple(s.run.id for s in still), what, remedy, {WITHHOLDS: True}),)
 
 
-def _judged(seen: SlipEvidence) -> bool:
+def _judged(evidence: SlipEvidence) -> bool:
     """Whether sizes are judged: not where the campaign states that they are right, or the joint slides."""
-    return seen.campaign.sensor.plausible is not False and seen.campaign.law is None
+    return evidence.campaign.sensor.plausible is not False and evidence.campaign.law is None

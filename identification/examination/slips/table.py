@@ -89,13 +89,13 @@ def mended(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
     return campaign, remarks
 
 
-def found_in(seen: SlipEvidence) -> tuple[Remark, ...]:
+def found_in(evidence: SlipEvidence) -> tuple[Remark, ...]:
     """Remarks on the statements that the measured oscillations contradict; only the refusal where there is one."""
     remarks: tuple[Remark, ...] = ()
     with np.errstate(all="ignore"):
         for slip in STATEMENT_SLIPS:
             try:
-                said = slip.find(seen)
+                said = slip.find(evidence)
             except np.linalg.LinAlgError:  # values too far apart to be compared
                 continue
             remarks += said

@@ -288,7 +288,7 @@ def _piece(
     if not decay.whole:
         # From the first sample of the largest reading, or from the last one of a hold.
         turn, size = int(turns[0]), 0.5 * float(swings.size[decay.start])
-        part = slice(int(swings.reached[decay.start]), int(swings.left[decay.start]) + 1)
+        part = slice(int(swings.reached[decay.start]), int(swings.departs[decay.start]) + 1)
         most = max(_AT_TURN * size, swings.least)
         near = part.start + np.flatnonzero(np.abs(reading[part] - reading[turn]) <= most)
         still = near.size and time_s[near[-1]] - time_s[near[0]] > _HELD * usual
@@ -311,7 +311,7 @@ def _piece(
         # The hand acts from the first extreme on, from which it moves the body noticeably.
         after = slice(decay.until, following.start + 1)
         acts = np.flatnonzero(swings.size[after] > _BAND * swings.size[following.start])
-        at = int(swings.left[decay.until + int(acts[0])])
+        at = int(swings.departs[decay.until + int(acts[0])])
         last = min(last, max(moved + 1, int(np.searchsorted(time_s, time_s[at] - usual))))
         if decay.start + decay.count >= decay.until - 1:  # it still swings when the hand acts
             last = free_until(time_s, reading, last, swings.at[decay.start + 1 : decay.until], noise)

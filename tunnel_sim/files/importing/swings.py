@@ -72,7 +72,7 @@ class Swings:
     """
 
     at: NDArray[np.intp]
-    left: NDArray[np.intp]
+    departs: NDArray[np.intp]
     reached: NDArray[np.intp]
     size: Array
     lasts: Array
@@ -126,7 +126,7 @@ def swings_of(time_s: Times, reading: PerSample, half: Seconds, drift: float = 0
         slow[0] |= lasts[0] > _SLOWER * part * ahead[0] + block * step
     return Swings(
         at=at,
-        left=left,
+        departs=left,
         reached=reached,
         size=size,
         lasts=lasts,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from diagnosis.answer.run_deviations import ScatterLimits
-from diagnosis.findings.cautions import CAUTIONS, said
+from diagnosis.findings.cautions import CAUTIONS, sentence_of
 from diagnosis.findings.judgements import zeros_apart
 from diagnosis.findings.repeatability import RunRepeatability
 from diagnosis.findings.units import own_repeatability
@@ -99,7 +99,7 @@ def test_zeros_that_would_close_an_unexplained_gap_are_mentioned(apart: float) -
     assert bool(facts) == (apart > 0.0)
     for fact in facts:
         assert fact.figures["share"] > 0.9
-        assert 'State zero = "per_run" under [sensor]' in said(CAUTIONS, fact)
+        assert 'State zero = "per_run" under [sensor]' in sentence_of(CAUTIONS, fact)
         stated = replace(data, sensor=replace(data.sensor, zero="common"))
         assert zeros_apart(studied(stated, nominal(data))) == ()
 

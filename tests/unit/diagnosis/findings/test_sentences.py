@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from diagnosis.findings.candidates import Candidate
-from diagnosis.findings.cautions import CAUTIONS, NOISE, PATCH, remark, said
+from diagnosis.findings.cautions import CAUTIONS, NOISE, PATCH, remark, sentence_of
 from diagnosis.findings.closure import Confirmation, GapSummary, NoiseSummary
 from diagnosis.findings.coefficients import Coefficients, size_note
 from diagnosis.findings.decision import decision
@@ -124,7 +124,7 @@ FIGURES = {
 @pytest.mark.parametrize("table", [CAUTIONS, PATCH])
 def test_every_caveat_and_note_is_a_sentence_of_its_figures(table: Any) -> None:
     for kind in table:
-        text = said(table, Fact(kind, FIGURES))
+        text = sentence_of(table, Fact(kind, FIGURES))
         assert text.endswith(".")
         assert text[0].isupper() or text.startswith("frictionloss")
         assert "{" not in text
@@ -133,7 +133,7 @@ def test_every_caveat_and_note_is_a_sentence_of_its_figures(table: Any) -> None:
 def test_every_reason_is_a_clause_of_its_figures() -> None:
     for texts in (
         [reason(Fact(kind, FIGURES)) for kind in REASONS],
-        [said(NOISE, Fact(kind, FIGURES)) for kind in NOISE],
+        [sentence_of(NOISE, Fact(kind, FIGURES)) for kind in NOISE],
     ):
         assert not any(text.endswith(".") or "{" in text or text[0].isupper() for text in texts)
         assert len(set(texts)) == len(texts)
@@ -141,7 +141,7 @@ def test_every_reason_is_a_clause_of_its_figures() -> None:
 
 def test_caveats_state_their_figures() -> None:
     def few(runs: int, *, driven: bool = False, windy: bool = False) -> str:
-        return said(CAUTIONS, Fact("few runs", {"runs": runs, "driven": driven, "windy": windy}))
+        return sentence_of(CAUTIONS, Fact("few runs", {"runs": runs, "driven": driven, "windy": windy}))
 
     assert few(1).endswith("Add runs with other springs and release angles.")
     assert few(1).startswith("There is one run only: the form of the decay alone distinguishes the causes.")
@@ -151,13 +151,14 @@ def test_caveats_state_their_figures() -> None:
     assert few(2, driven=True).endswith(
         "form of the motion alone distinguishes the causes. Add runs with other inputs."
     )
-    left_out = said(CAUTIONS, Fact("another mode", {"ratio": 1.5, "runs": ["r1", "r3"]}))
+    left_out = sentence_of(CAUTIONS, Fact("another mode", {"ratio": 1.5, "runs": ["r1", "r3"]}))
     assert "at least 1.5 times as fast as the same spring with the wind off: r1, r3." in left_out
     differs = Fact("not confirmed", FIGURES)
-    assert "by 0.0011° (root mean square over beta), more than a tenth of the noise (0.00057°)." in said(
-        CAUTIONS, differs
+    assert (
+        "by 0.0011° (root mean square over beta), more than a tenth of the noise (0.00057°)."
+        in sentence_of(CAUTIONS, differs)
     )
-    assert "by 0.0011 °/s (root mean square over beta)" in said(CAUTIONS, differs, "rad/s")
+    assert "by 0.0011 °/s (root mean square over beta)" in sentence_of(CAUTIONS, differs, "rad/s")
 
 
 def test_remarks_on_the_noise_have_their_remedies() -> None:

@@ -46,7 +46,7 @@ def test_what_a_set_knows_better_neither_costs_nor_pays() -> None:
 
 def test_runs_that_repeat_better_cost_less() -> None:
     rough, fine = columns(0.03 * WIDTH), columns(0.03 * WIDTH)
-    close = ScatterColumns(fine.bases, fine.deviations, fine.common, [0.2 * one for one in fine.seen])
+    close = ScatterColumns(fine.bases, fine.deviations, fine.common, [0.2 * one for one in fine.residuals])
     known = rough.products.own
     assert cost(rough, known) - cost(close, known) > 2.0 * (RUNS - 1) * np.log(4.0)
 
@@ -54,7 +54,7 @@ def test_runs_that_repeat_better_cost_less() -> None:
 def test_few_runs_that_repeat_exactly_have_no_width() -> None:
     """Each shows a deviation of 3e-4 usual widths, and has none; a normal density would keep a tenth of one."""
     found = columns(3e-4 * WIDTH)
-    pairs = list(zip(found.seen, found.deviations, strict=True))[:3]
+    pairs = list(zip(found.residuals, found.deviations, strict=True))[:3]
     noise = [0.1 * (z - d[:, 0] * (d[:, 0] @ z) / (d[:, 0] @ d[:, 0])) for z, d in pairs]
     few = ScatterColumns(found.bases[:3], found.deviations[:3], found.common[:3], noise)
     assert few.likeliest(PRIOR).widths[0] < 0.01 * WIDTH
@@ -88,7 +88,7 @@ def test_parameters_that_the_runs_do_not_determine_cost_nothing_when_given() -> 
     one = columns(0.03 * WIDTH)
     none = [np.zeros_like(part) for part in one.common]
     common = [np.hstack([part, part, zero]) for part, zero in zip(one.common, none, strict=True)]
-    found = ScatterColumns(one.bases, one.deviations, common, one.seen).likeliest(PRIOR)
+    found = ScatterColumns(one.bases, one.deviations, common, one.residuals).likeliest(PRIOR)
     known, both = one.products.own, np.array([True, True, True])
     assert found.cost(known, both) == pytest.approx(
         one.likeliest(PRIOR).cost(known, np.array([True])), abs=0.5

@@ -274,7 +274,7 @@ def test_residuals_from_a_smooth_curve_do_not_depend_on_the_clock(burst):
     time = np.cumsum(np.where(rng.random(600) < 0.1, 1.0, burst))
     curve = SmoothCurve(time, 5)
     polynomial = ((time - time[0]) / (time[-1] - time[0]) - 0.4) ** 5
-    inside = curve.left(rng.normal(size=time.size)[:, None] + 1e3 * polynomial[:, None] * [0.0, 1.0])
+    inside = curve.residuals(rng.normal(size=time.size)[:, None] + 1e3 * polynomial[:, None] * [0.0, 1.0])
     np.testing.assert_allclose(inside[:, 0], inside[:, 1], atol=1e-6)  # a quintic is a curve too
-    again = curve.left(inside[:, 0])  # and nothing of a curve is left in residuals
+    again = curve.residuals(inside[:, 0])  # and nothing of a curve is left in residuals
     np.testing.assert_allclose(again, inside[:, 0], atol=1e-6)

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from diagnosis.findings.cautions import PATCH, said
+from diagnosis.findings.cautions import PATCH, sentence_of
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.blocks import prepare
 from diagnosis.model.fact import Fact
@@ -98,7 +98,7 @@ def test_a_delay_replays_from_a_key_frame_with_the_history_that_its_note_fills(
     wanted = simulate_joint(engine, model.law.rest, start, 0.5, 0).angle
 
     samples = history_of(0.0125, engine.opt.timestep)
-    note = said(PATCH, Fact("delayed control", {"index": 0, "samples": samples}))
+    note = sentence_of(PATCH, Fact("delayed control", {"index": 0, "samples": samples}))
     call = note[note.index("mujoco.mj_init") :].rstrip(".")
 
     def replayed(*, filled: bool) -> np.ndarray:

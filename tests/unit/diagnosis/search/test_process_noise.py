@@ -217,7 +217,7 @@ def test_a_rival_beside_turbulence_is_an_answer_as_well():
     view = whole_runs(base, (*BUFFETING, type(strong), OwnCubic, effect_class("coulomb_friction")))
     one, other = weigh_random_moments(view, [spring])
     assert {one.effects, other.effects} == {("buffeting", "cubic_stiffness"), ("buffeting", "own_cubic")}
-    assert other.left.excess == pytest.approx(one.left.excess, rel=0.01, abs=1.0)
+    assert other.fitted_set.excess == pytest.approx(one.fitted_set.excess, rel=0.01, abs=1.0)
 
 
 @pytest.mark.slow

@@ -48,7 +48,7 @@ def weighed(study: Study, moment: RandomAnswer | None = None) -> Sets:
     """A fit with vortex shedding leaves half of the gap."""
     steady = Hypothesis(("vortex_shedding",), _with_excess(study.nominal, 0.5))
     view = WholeRuns(study.prepared, study.nominal)
-    return Sets(view, (steady,), () if moment is None else (moment,), settled=steady)
+    return Sets(view, (steady,), () if moment is None else (moment,), confirmed=steady)
 
 
 def shedding(share: float) -> RandomAnswer:

@@ -100,7 +100,7 @@ def off() -> tuple[Fit, Fit]:
 def away(fitted: Fit) -> float:
     """How far linear theory still moves the last parameter, in standard deviations."""
     here = fitted.columns.at(fitted.widths, width_prior(fitted.problem))
-    return float(abs(here.found.common[-1]) / fitted.std(fitted.problem.names[-1]))
+    return float(abs(here.likeliest.common[-1]) / fitted.std(fitted.problem.names[-1]))
 
 
 def test_a_fit_beside_scatter_reaches_its_minimum(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,7 +8,7 @@ from math import pi, radians, sqrt
 import numpy as np
 import pytest
 
-from tunnel_lab.bench.try_it import RigTrial, chosen_effect, effect_words, plan_text, said, simulate
+from tunnel_lab.bench.try_it import RigTrial, chosen_effect, effect_words, plan_text, simulate, trial_sentence
 from tunnel_lab.terminal.arguments import parse_effect
 from tunnel_sim.effects import known_effects
 from tunnel_sim.files.rig_file import load_rig
@@ -23,7 +23,7 @@ def test_the_nominal_model_swings_as_its_spring_says() -> None:
     assert np.array_equal(nominal, seen)
     assert time[-1] == pytest.approx(10.0, abs=0.01)
     frequency = sqrt(trial.spring_stiffness / load_rig().dynamics.yaw_inertia) / (2.0 * pi)
-    assert f"swings at {frequency:.3g} Hz" in said(trial, time, nominal, seen)
+    assert f"swings at {frequency:.3g} Hz" in trial_sentence(trial, time, nominal, seen)
 
 
 @pytest.mark.parametrize(
