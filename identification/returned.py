@@ -1,4 +1,4 @@
-"""A check of what an estimator returned: an estimate of the given runs, with finite values in the stated units.
+"""A check of an estimator's result: an estimate of the given runs, with finite values in the stated units.
 
 `identify`, and through it every command, and `check_estimator` check the answer of an estimator here.
 """

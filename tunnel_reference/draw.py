@@ -241,7 +241,7 @@ def redraw(draw: CampaignDraw) -> CampaignDraw:
 def draw_families(
     rng: np.random.Generator, number: int, first: Sequence[str] = (), known: Sequence[str] = FAMILIES
 ) -> tuple[str, ...]:
-    """Different families, those after the first equally likely."""
+    """Different families; after the first, all are equally likely."""
     others = [name for name in known if name not in first]
     drawn = rng.choice(np.array(others), size=max(number - len(first), 0), replace=False)
     return (*first, *(str(name) for name in drawn))[:number]

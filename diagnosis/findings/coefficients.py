@@ -51,8 +51,9 @@ class Coefficients:
         covariance: of ``cn_beta`` and ``cn_r`` in ``after``, and of both in ``in_phase``, 1/rad², shape (4, 4);
             empty without a named lag.
         note: on their meaning, where a cause changes it (a lag changes the meaning of Cnr).
-        correlation: of those after, in their order, by the noise of the readings, the small causes and the rivals;
-            the other parts of their variances count as independent. Shape (n, n); empty where it is not known.
+        correlation: of the coefficients after, in their order, by the noise of the readings, the small causes and
+            the rivals; the other parts of their variances count as independent. Shape (n, n); empty where it is not
+            known.
     """
 
     before: Mapping[str, Quantity]

@@ -138,7 +138,7 @@ def _part(
 
 
 def _ringing(ringing: Sequence[Ringing | None], run: RunData, blocks: int) -> Array:
-    """Block means of what a rod adds to the slow motion of a run at each point, rad, shape (points, blocks)."""
+    """Block means of the rod's part of the reading of a run at each point, rad, shape (points, blocks)."""
     none = np.zeros(blocks + 1)
     added = [(none, none) if one is None else one.added(none, none, run.interval) for one in ringing]
     return block_means([run] * len(added), np.stack([a for a, _ in added]), np.stack([r for _, r in added]))

@@ -39,7 +39,7 @@ def _changing_swings(names: Sequence[str]) -> dict[type[Effect], list[str]]:
     return {kind: own for kind, own in found.items() if own}
 
 
-#: Units of what acts on the yaw axis, and of the same per unit inertia.
+#: Units of moments on the yaw axis, and of moments per unit inertia.
 _PER_INERTIA = {
     "N m": "rad/s2",
     "N m/rad": "1/s2",

@@ -318,7 +318,7 @@ class RunData:
         return means if means.shape[-1] == self.reading.size else means_of(means, self.merges)
 
     def part(self, first: int = 0, last: int | None = None) -> RunData:
-        """The run from one block up to, and without, another; None: to the end.
+        """The run from a block to before another; None: to the end.
 
         Its duration is the record's, less the part left out at the start.
         """

@@ -62,14 +62,14 @@ class RunNoise(ABC):
         return _correlated(values, self.taps(len(values)))
 
     def powers_onward(self, values: Array) -> Array:
-        """Sum of squares of what `white` makes of the values from each one to the last alone, shape (n,)."""
+        """Power of the whitened values from each one to the last, with the earlier ones set to 0, shape (n,)."""
         taps = self.taps(values.size)
         lags = np.correlate(taps, taps, "full")[taps.size - 1 :]
         added = values * (2.0 * _correlated(values, lags) - lags[0] * values)
         return np.cumsum(added[::-1])[::-1]
 
     def part(self, first: int, last: int) -> RunNoise:
-        """The noise of the blocks from one up to, and without, another."""
+        """The noise of the blocks from ``first`` to before ``last``."""
         del first, last
         return self
 
@@ -101,7 +101,7 @@ class AutoregressiveNoise(RunNoise):
 
     Args:
         variance: of the errors, rad².
-        whitening: filter of the errors by which each value differs from its prediction from those before it: 1 and
+        whitening: prediction-error filter: each value less its prediction from the earlier ones; 1 and
             the negative autoregressive coefficients, shape (order + 1,), of order 1 or more.
     """
 
@@ -144,7 +144,7 @@ class NoiseWithMoment(RunNoise):
     """Noise beside the response to a random moment, which begins at rest with the run.
 
     Args:
-        variance: of what both filters leave, rad².
+        variance: after both filters, rad².
         sensor: the noise beside the response; its variance does not matter.
         numerator: of the filter that makes both white after the sensor's noise alone is white, shape (m,).
         denominator: of that filter, shape (k,).

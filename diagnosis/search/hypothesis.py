@@ -422,7 +422,7 @@ def _first_forms(fitted: Fit) -> tuple[Form, ...]:
 
 
 def _likeliest_forms(fitted: Fit) -> tuple[Form, ...]:
-    """The first form of every effect, or another that explains more than chance and much of what the first leaves.
+    """The first form of every effect, or another that explains much of its residual, beyond chance.
 
     Where the noise is overestimated, a wrong form may leave less than the noise as a whole.
     """
@@ -444,7 +444,7 @@ def _likeliest_forms(fitted: Fit) -> tuple[Form, ...]:
 
 
 def _worth_a_form(fitted: Fit, least: float) -> float:
-    """χ² below which another form explains more than chance, and much of what is left, dimensionless.
+    """χ² below which another form explains much of the residual, beyond chance, dimensionless.
 
     Args:
         least: χ² with the forms so far.

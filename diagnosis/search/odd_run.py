@@ -168,7 +168,7 @@ def _explaining(sets: Sequence[Hypothesis], nominal: Fit, kinds: Sequence[type[E
 
     Args:
         sets: the nominal model first, in runs that repeat.
-        kinds: the effects that may be named, those between runs among them.
+        kinds: the effects that may be named, also effects between runs.
     """
     data, chosen, weighing = nominal.problem.data, nominal.settings.selection, nominal.settings.weighing
     if data.driven or len(data.runs) < DISTURBED_FEWEST:

@@ -83,7 +83,7 @@ class Periodogram:
         return power / np.maximum(count, 1), count / HANN
 
     def bridged(self, own: float) -> Array:
-        """The power, with the ordinates at the harmonics interpolated from those between them, shape (n,).
+        """The power, with the ordinates at the harmonics interpolated from their neighbours, shape (n,).
 
         Args:
             own: frequency of the motion, in the unit of the frequency.

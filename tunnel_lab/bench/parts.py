@@ -221,7 +221,7 @@ class Chart(ui.element, component="static/chart.js"):
         series: labels of the curves and the names of their colours (``before``, ``after``, ``soft``, …).
         data: abscissas and the ordinates of every curve; None is a gap.
         moved: called with the id of a mark and its new position, in the unit of its axis; may be awaitable.
-        added: called with the abscissa of a release to add, the middle of what is visible; None: no button.
+        added: called with the abscissa of a release to add, the middle of the visible part; None: no button.
         removed: called with the id of a mark on which Delete is pressed.
     """
 

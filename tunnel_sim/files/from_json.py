@@ -16,7 +16,7 @@ def from_json_fields(read: Callable[[Mapping[str, Any]], Mapping[str, Any]]) -> 
     """Mark the function of a class that rearranges its JSON into its fields: the inverse of ``to_json_dict``.
 
     Args:
-        read: gives the fields by name, in JSON's types, from what ``to_json_dict`` has written.
+        read: gives the fields by name, in JSON's types, from a document of ``to_json_dict``.
     """
 
     def rearranged(_: type, data: Any) -> Any:

@@ -56,7 +56,7 @@ class ImportStatements:
         return from_name(self.pattern, file)
 
     def of_file(self, file: Path) -> dict[str, float]:
-        """Conditions stated of a whole file, by its name or the table, which may name runs instead."""
+        """Conditions of a whole file, from its name or the table; the table may have rows for runs instead."""
         found = self.named(file)
         if self.table is not None:
             with suppress(TunnelError):
