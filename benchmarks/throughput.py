@@ -10,6 +10,7 @@ import argparse
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from statistics import median
 
 import mujoco
@@ -139,8 +140,8 @@ def main() -> None:
     rig = load_rig()
     twist = RodTwist(1e-3, 0.3)
     linear = build_model(rig, LINEAR).mj
-    busy = build_model(rig, RunSettings(**{**vars(LINEAR), "parameters": EVERYTHING})).mj
-    rod = RunSettings(**{**vars(LINEAR), "rod_twist": twist})
+    busy = build_model(rig, replace(LINEAR, parameters=EVERYTHING)).mj
+    rod = replace(LINEAR, rod_twist=twist)
     heads = ("comparison", "baseline", "subject", "ratio (median)", "ratio (best)", "target")
     table = numbers("Throughput, RK4 steps per second", *heads)
 
