@@ -69,12 +69,34 @@ def diagnose(
     joint, own = (None, model) if isinstance(model, NominalModel) else (model, None)
     if joint is not None:
         campaign, own = with_law(campaign, joint.law)
+    freedom, names = campaign.sensor.freedom, (campaign.name, *(run.id for run in campaign.runs))
+    with freedom.errors():
+        found = _diagnosed(campaign, leave_out, kinds, progress, (joint, own), settings, rivals)
+    return freedom.document(found, names).in_words()
+
+
+def _diagnosed(
+    campaign: Campaign,
+    leave_out: Collection[str],
+    kinds: Sequence[type[Effect]] | None,
+    progress: Progress | None,
+    models: tuple[JointModel | None, NominalModel | None],
+    settings: Settings,
+    rivals: Sequence[Rival],
+) -> Diagnosis:
+    """The answer in the units of an angle, without its texts; other arguments as in `diagnose`.
+
+    Args:
+        models: the user's joint, whose law the campaign then has, and the nominal model; None: that of its kind.
+    """
+    joint, own = models
     campaign, short = without_short(campaign)
     refuse_undiagnosable(campaign, own)
     kinds = known_effects() if kinds is None else kinds
+    kinds = [kind for kind in kinds if kind.possible(campaign.sensor.freedom)]
     say = progress or (lambda _: None)
     with answering_with(kinds):
-        judged = not isinstance(model, NominalModel)
+        judged = joint is not None or own is None
         chosen = choose(campaign, kinds, own, judged=judged)
         study = _studied(chosen, progress, settings, rivals)
         asked = Question(joint, short, tuple(leave_out), say)
@@ -89,7 +111,7 @@ def diagnose(
                 without = AnswerWithout(
                     others.causes, 1.0 if others.answer is None else others.answer.probability
                 )
-        return composed(found, chosen, asked, without).in_words()
+        return composed(found, chosen, asked, without)
 
 
 def _without_outlier(

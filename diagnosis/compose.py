@@ -42,6 +42,7 @@ from diagnosis.findings.spring_choices import spring_choices
 from diagnosis.findings.trade_off import least_separated
 from diagnosis.findings.units import (
     own_estimates,
+    own_fact,
     own_hidden,
     own_repeatability,
     sized_coefficients,
@@ -198,7 +199,9 @@ def composed(
         },
         disturbed=study.disturbed,
         remarks=remarks,
-        inclusion={} if cycling else inclusion(named.candidates, study.beside, study.settings.gap),
+        inclusion={}
+        if cycling
+        else inclusion(named.candidates, study.beside, study.settings.gap, study.campaign.sensor.freedom),
         waterfall=closes.steps,
         rest=named.rest,
         repeatability=repeats
@@ -208,6 +211,8 @@ def composed(
         sizes=cause_sizes(study) if study.named else (),
         found=_beside(study, chosen, named, caveats),
         data=chosen.examined,
+        motion=chosen.examined.sensor.freedom.motion,
+        motion_scale=similarity.angle,
         **findings_of(Answered(chosen.examined, study, named.coefficients.before, named.coefficients.after)),
     )
 
@@ -251,11 +256,14 @@ def _beside(study: Study, chosen: Chosen, named: _Named, caveats: tuple[Fact, ..
         rivals=_from_outside(study) if named.unsure else (),
         second_modes=_second_modes(study, chosen) if unknown else (),
         limit_cycles=named.limit_cycles,
-        noise=noise.reason,
-        cautions=caveats,
-        noted=(
-            *noise_noted(noise, study.prepared.trend, study.gap.test, named=study.named),
-            *hum_noted(study.campaign, study.prepared.hum, study.similarity),
+        noise=own_fact(noise.reason, study.similarity),
+        cautions=tuple(own_fact(one, study.similarity) for one in caveats),
+        noted=tuple(
+            replace(one, fact=own_fact(one.fact, study.similarity))
+            for one in (
+                *noise_noted(noise, study.prepared.trend, study.gap.test, named=study.named),
+                *hum_noted(study.campaign, study.prepared.hum, study.similarity),
+            )
         ),
     )
 
@@ -388,7 +396,7 @@ def _identified(study: Study, chosen: Chosen) -> Estimate | None:
     if not scatter_alone or study.disturbed or chosen.limit_cycles or own_model:
         return None
     try:
-        return identify(chosen.campaign, throw=False)
+        return identify(chosen.campaign.as_angle, throw=False)
     except TunnelError:  # the examination refuses what the diagnosis may still compare
         return None
 

@@ -39,7 +39,7 @@ class Diagnosis(Findings):
         rest = self.rest and replace(self.rest, words=self.rest.in_words(self))
         place = where_words(self.where, found.place or found.nowhere, self)
         noted = (remark(one, unit) for one in found.noted)
-        return replace(
+        said = replace(
             self,
             verdict=verdict(self, rest.words if rest else ""),
             where=replace(self.where, words=place),
@@ -53,6 +53,7 @@ class Diagnosis(Findings):
             remarks=(*self.remarks, *(one for one in noted if one not in self.remarks)),
             model=model and replace(model, notes=tuple(sentence_of(PATCH, one) for one in model.differences)),
         )
+        return self.freedom.document(said, self.names)
 
     def with_hashes(self, hashes: Mapping[str, str]) -> Self:
         """The answer with the SHA-256 of each file of its records, by name."""

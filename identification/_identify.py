@@ -64,6 +64,18 @@ def identify(
     """
     campaign = as_campaign(campaign).without(leave_out)
     chosen = make_estimator(estimator) if isinstance(estimator, str) else estimator
+    freedom = campaign.sensor.freedom
+    with freedom.errors(), shown_by(progress):
+        found = _identified(campaign, chosen, leave_out, throw=throw)
+    asked = {status for status in found.statuses if freedom.windy or status is not Status.NO_WIND_ON}
+    found = replace(found, statuses=by_severity(asked), motion=freedom.motion)
+    return freedom.document(found, (campaign.name, *(run.id for run in campaign.runs)))
+
+
+def _identified(
+    campaign: Campaign, chosen: Estimator, leave_out: Collection[str], *, throw: bool
+) -> Estimate:
+    """The estimate in the units of an angle; arguments as in `identify`."""
     if not campaign.runs:
         raise TunnelError("campaign without runs", where=campaign.name, remedy="add at least one run")
     if campaign.driven and not takes_driven(chosen):  # it would mistake them for free decays
@@ -80,12 +92,11 @@ def identify(
         () if chosen.name == "filter_error" else tuple(run.id for run in remaining.runs if is_ambient(run))
     )
     remaining = replace(remaining, runs=tuple(run for run in remaining.runs if run.id not in random))
-    with shown_by(progress):
-        found = (
-            checked_return(chosen.estimate(remaining), chosen.name, remaining)
-            if remaining.runs
-            else Estimate(campaign.name, chosen.name, ())
-        )
+    found = (
+        checked_return(chosen.estimate(remaining), chosen.name, remaining)
+        if remaining.runs
+        else Estimate(campaign.name, chosen.name, ())
+    )
     found = widened_by_rounding(found, remaining.runs)
     found = withheld(widened_by_contradictions(found, remaining, examined.remarks), examined.remarks)
     estimate = as_angles(found, campaign.sensor)

@@ -25,6 +25,7 @@ from identification.trade_off import TradeOff
 from tunnel_sim.files.reading import as_described, check_shape
 from tunnel_sim.files.writing import as_json
 from tunnel_sim.vocabulary.errors import TunnelError, installing, library
+from tunnel_sim.vocabulary.freedom import Motion
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
@@ -224,6 +225,8 @@ class Estimate:
         repeatability: the scatter between runs, which the covariance includes; None where none is stated and the
             runs show none beyond their noise.
         trade_off: the two coefficients that the runs separate least; None where they separate all of them.
+        motion: ``displacement`` of a linear freedom: m, N and kg then replace rad, N m and kg m², and
+            ``yaw_inertia`` is the mass; the JSON of an angle does not have it.
     """
 
     __pydantic_config__ = _FINITE
@@ -245,6 +248,7 @@ class Estimate:
     remarks: tuple[Remark, ...] = ()
     repeatability: RunScatter | None = None
     trade_off: TradeOff | None = None
+    motion: Motion = "angle"
 
     @property
     def status(self) -> Status:
@@ -353,7 +357,9 @@ class Estimate:
             "estimator": self.estimator,
             **_statuses_json(self.statuses),
             "remarks": as_json(self.remarks),
-            **_fields_json(self, "statuses", "remarks", "runs"),
+            **_fields_json(
+                self, "statuses", "remarks", "runs", *(("motion",) if self.motion == "angle" else ())
+            ),
             "runs": as_json(self.runs),
         }
 

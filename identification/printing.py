@@ -13,6 +13,7 @@ from identification.show.blocks import Block, Paragraph, TextTable
 from identification.show.numbers import concise, significant, unit, unit_mark, with_std
 from identification.status import SYSTEMATIC, Remark, Status
 from tunnel_sim.vocabulary.errors import counted
+from tunnel_sim.vocabulary.freedom import ANGLE, FREEDOMS, Freedom
 
 if TYPE_CHECKING:
     from identification.trade_off import Combination, TradeOff
@@ -71,7 +72,7 @@ def estimate_blocks(
         f"and {counted(count, 'more run')}, which runs_frame() lists" if count > 0 and not conditions else ""
     )
     shown = runs_table(document, conditions)
-    return (
+    blocks: tuple[Block, ...] = (
         coefficients_table(document),
         shown,
         *(map(windows_table, document["runs"]) if windows else ()),
@@ -79,6 +80,17 @@ def estimate_blocks(
         Paragraph(BRACKETS if shown.rows else ""),
         *(Paragraph(line) for line in notes(document)),
     )
+    return freedom_of(document).texts(blocks, names_in(document))
+
+
+def freedom_of(document: Document) -> Freedom:
+    """The freedom of an estimate."""
+    return FREEDOMS[document.get("motion", ANGLE.motion)]
+
+
+def names_in(document: Document) -> tuple[str, ...]:
+    """Names of the user's in an estimate."""
+    return document["campaign"], *(run["id"] for run in document["runs"])
 
 
 def notes(document: Document) -> list[str]:
@@ -92,7 +104,8 @@ def notes(document: Document) -> list[str]:
         *repeatability_lines(document),
         *filter(None, [trade_off_line(TradeOff.from_json_dict(document.get("trade_off")), SYMBOLS)]),
     ]
-    return [*beside, *(f"Note: {note}" for note in (*remarks, *status_lines(document)))]
+    lines = [*beside, *(f"Note: {note}" for note in (*remarks, *status_lines(document)))]
+    return freedom_of(document).texts(lines, names_in(document))
 
 
 Conditions = Mapping[str, tuple[float | None, float]]
@@ -221,9 +234,10 @@ def estimate_brief(document: Document) -> str:
     place = "" if whole or not run else f" of {run['id']}"
     status = document["status"].replace("_", " ")
     count = f"{len(document['runs'])} run{'' if len(document['runs']) == 1 else 's'}"
+    values = freedom_of(document).words(", ".join(found) + place, names_in(document))
     return (
         f"Estimate of {document['campaign']!r} by {document['estimator']}: {status}, {count}\n"
-        f"  {', '.join(found) + place or 'no value'}\n"
+        f"  {values or 'no value'}\n"
         "  print() shows all; .to_frame(), .runs_frame(), .windows_frame()"
     )
 
@@ -243,11 +257,11 @@ def coefficients_table(document: Document) -> TextTable:
 def runs_table(document: Document, conditions: Conditions | None = None) -> TextTable:
     """Natural frequency and damping ratio of the runs: of all, with their conditions, or of `SHOWN_RUNS`."""
     runs = document["runs"][: None if conditions else SHOWN_RUNS]
-    stated = ("Kr\n[N m/rad]", "V\n[m/s]") if conditions else ()
+    stated = ("Kr\n[N m/rad]", *["V\n[m/s]"] * freedom_of(document).windy) if conditions else ()
     rows = tuple(
         (
             run["id"],
-            *(_stated(*conditions[run["id"]]) if conditions else ()),
+            *(_stated(*conditions[run["id"]])[: len(stated)] if conditions else ()),
             _concise(run["omega_n"]),
             _concise(run["zeta"]),
             run["status"].replace("_", " "),
@@ -296,11 +310,12 @@ def budget_blocks(document: Document) -> tuple[Block, ...]:
     rows = [(part["name"], *(_budget_cell(part, name) for name in names)) for part in components]
     rows.append(("all together", *(significant(combined[name], 2) for name in names)))
     title = "Uncertainty budget: one standard uncertainty each"
-    return (
+    blocks: tuple[Block, ...] = (
         TextTable(title, ("source", *headings), tuple(rows), right=headings),
         *(Paragraph(_dominant(components, name)) for name in names),
         *(Paragraph(f"{part['name']}: {part['note']}") for part in components if part["note"]),
     )
+    return freedom_of(document).texts(blocks, names_in(document))
 
 
 def _budget_cell(component: Document, name: str) -> str:

@@ -41,6 +41,7 @@ from identification.show.style import figure, grid, styled
 from tunnel_sim.effects import BetweenRuns, known_effects
 from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.vocabulary.dimensions import beside
+from tunnel_sim.vocabulary.freedom import Freedom
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -173,8 +174,13 @@ def _scatter(study: Study) -> set[str]:
     return {kind.name for kind in known_effects() if issubclass(kind, BetweenRuns) and data.may_show(kind)}
 
 
-def inclusion(answers: Sequence[Candidate], read_off: Sequence[str], chosen: GapSettings) -> dict[str, float]:
+def inclusion(
+    answers: Sequence[Candidate], read_off: Sequence[str], chosen: GapSettings, freedom: Freedom
+) -> dict[str, float]:
     """Probability of every effect of the vocabulary to be among the causes.
+
+    Args:
+        freedom: of the body, which may exclude effects.
 
     Returns:
         The sum of the probabilities of the answers that name the effect; for a cause detected in the records, 1
@@ -183,6 +189,7 @@ def inclusion(answers: Sequence[Candidate], read_off: Sequence[str], chosen: Gap
     found = {
         kind.name: min(sum(c.probability for c in answers if kind.name in c.effect.split(" + ")), 1.0)
         for kind in known_effects()
+        if kind.possible(freedom)
     }
     return found | dict.fromkeys(read_off, 1.0 - chosen.detection_rate)
 

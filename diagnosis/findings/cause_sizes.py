@@ -12,7 +12,7 @@ from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import linear_coefficients, resonance
 from diagnosis.model.parameters import Point
 from diagnosis.search.study import Study
-from identification.show.numbers import significant, unit_shown
+from identification.show.numbers import joined_mark, motion_shown, significant, unit_shown
 from identification.signal.decay_fit import Reading, fit_run
 from identification.signal.free_decay import Decay
 from tunnel_sim.effects.capabilities import Friction
@@ -62,8 +62,8 @@ class CauseSize:
         Returns:
             Empty where the simulated run does not show it.
         """
-        (mark, factor), angle = unit_shown(unit), unit_shown("rad")[1]
-        mark = mark if mark == "°" else f" {mark}"
+        (mark, factor), (degree, angle) = unit_shown(unit), motion_shown(unit)
+        mark, degree = joined_mark(mark), joined_mark(degree)
         changes = []
         zeta, without = self.damping_ratio, self.damping_ratio_without
         if abs(zeta - without) > _VISIBLE * max(abs(zeta), abs(without)):
@@ -78,9 +78,9 @@ class CauseSize:
             return ""
         changes.append(f"the reading changes by {significant(reading, 2)}{mark} root mean square")
         held = angle * self.stands
-        stands = f"; it stops the body up to {significant(held, 2)}° from rest" if held > 0.0 else ""
+        stands = f"; it stops the body up to {significant(held, 2)}{degree} from rest" if held > 0.0 else ""
         amplitude = significant(angle * self.amplitude, 2)
-        return f"Over three cycles from {amplitude}°: {', '.join(changes)}{stands}"
+        return f"Over three cycles from {amplitude}{degree}: {', '.join(changes)}{stands}"
 
     @from_json_fields
     @staticmethod
@@ -133,13 +133,17 @@ def cause_sizes(study: Study) -> tuple[CauseSize, ...]:
         size = CauseSize(
             effect=kind.name,
             run=run.id,
-            amplitude=amplitude,
+            amplitude=study.similarity.own(amplitude, "rad"),
             damping_ratio=decay[1],
             damping_ratio_without=decay_without[1],
             frequency_change=decay[0] / decay_without[0] - 1.0,
             zero_change=reading_unit * (decay[2] - decay_without[2]),
             reading_change=reading_unit * float(np.sqrt(np.mean((curves[0] - curves[1]) ** 2))),
-            stands=effect.stands(linear_coefficients(fit, index)[2]) if isinstance(effect, Friction) else 0.0,
+            stands=(
+                study.similarity.own(effect.stands(linear_coefficients(fit, index)[2]), "rad")
+                if isinstance(effect, Friction)
+                else 0.0
+            ),
         )
         sizes.append(size)
     return tuple(sizes)

@@ -6,7 +6,7 @@ that line is all that the document, its schema, the terminal, the report, the be
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Protocol, Self
 
@@ -14,9 +14,11 @@ from diagnosis.findings.misfit import Misfit
 from diagnosis.search.study import Study
 from diagnosis.settings import Settings
 from identification.show.blocks import Figure, Section
+from identification.show.drawing import in_words
 from identification.show.quantity import Quantity
 from identification.status import Remark
 from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.freedom import ANGLE, Freedom
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
@@ -60,6 +62,22 @@ class Picture:
         """Its place in a section."""
         return Figure(self.name, self.caption)
 
+    def of(self, freedom: Freedom, names: Sequence[str]) -> Picture:
+        """The figure in the words of a freedom.
+
+        Args:
+            names: of the user's, which are kept.
+        """
+        if freedom is ANGLE:
+            return self
+        caption, description = (freedom.words(text, names) for text in (self.caption, self.description))
+
+        def draw() -> Drawing | None:
+            drawn = self.draw()
+            return None if drawn is None else in_words(drawn, freedom, names)
+
+        return Picture(self.name, caption, description, draw)
+
 
 class Finding:
     """A finding of a diagnosis with a section of its own."""
@@ -92,6 +110,10 @@ class Judged(Protocol):
     @property
     def causes(self) -> tuple[str, ...]:
         """Effect names, sorted; ``unknown``, or none."""
+
+    @property
+    def freedom(self) -> Freedom:
+        """The freedom of the body."""
 
     @property
     def names_effects(self) -> bool:

@@ -22,6 +22,7 @@ from identification.signal.strokes import reversals, strokes
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.capabilities import Friction
 from tunnel_sim.files.writing import as_json
+from tunnel_sim.vocabulary.dimensions import dimension
 from tunnel_sim.vocabulary.quantities import Angles, Rates
 from tunnel_sim.vocabulary.record import Array
 
@@ -265,7 +266,7 @@ def friction_figure(curve: FrictionCurve) -> Figure:
         )  # fmt: skip
         tops.append(min(float((mean + INTERVAL * error).max()), _MOST_DRAWN * float(moment.max())))
     axes.set_ylim(0.0, _ROOM_ABOVE * max(tops))
-    mark = "N m" if curve.unit == "N m" else f"{unit_mark(curve.unit)}, over inertia"
+    mark = unit_mark(curve.unit) + ("" if dimension(curve.unit)[0] else ", over inertia")
     axes.set(xlabel="rate [rad/s]", ylabel=f"{plain(curve.effect)} [{mark}]")
     log_axis(axes, "x")
     axes.legend(

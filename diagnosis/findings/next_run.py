@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Self
@@ -24,6 +25,7 @@ from identification.show.numbers import reading_shown
 from identification.show.quantity import Quantity
 from tunnel_sim.effects.capabilities import OwnNumbers, Periodic
 from tunnel_sim.vocabulary.campaign import speed_groups
+from tunnel_sim.vocabulary.freedom import ANGLE, Freedom
 from tunnel_sim.vocabulary.quantities import Seconds
 from tunnel_sim.vocabulary.record import Array
 
@@ -60,19 +62,23 @@ class PlannedRun:
             self,
             spring_stiffness=_adjustable(similarity.own(self.spring_stiffness, "N m/rad"), 0.01),
             wind_speed=_adjustable(self.wind_speed, 0.1),
-            release_angle=_adjustable(self.release_angle, 0.01),
+            release_angle=_adjustable(
+                similarity.own(self.release_angle, "rad"), _step_of_release(similarity)
+            ),
             duration=_adjustable(similarity.own(self.duration, "s"), 1.0),
         )
 
-    def conditions(self, *, robot: bool = False) -> str:
+    def conditions(self, freedom: Freedom = ANGLE, *, robot: bool = False) -> str:
         """The conditions of the run, in words.
 
         Args:
+            freedom: of the body.
             robot: whether the body is the joint of a machine, which has neither a spring to choose nor a wind.
         """
-        wind = "wind off" if self.wind_speed == 0.0 else f"wind at {self.wind_speed:g} m/s"
-        rig = "" if robot else f"spring of {self.spring_stiffness:g} N m/rad, {wind}, "
-        angle = reading_shown(self.release_angle, 2)
+        wind = "wind off, " if self.wind_speed == 0.0 else f"wind at {self.wind_speed:g} m/s, "
+        wind = wind if freedom.windy else ""
+        rig = "" if robot else f"spring of {self.spring_stiffness:g} {freedom.unit('N m/rad')}, {wind}"
+        angle = reading_shown(self.release_angle, 2, next(iter(freedom.shown)))
         return f"{rig}release at {angle}{' from the rest' if robot else ''}, duration {self.duration:g} s"
 
 
@@ -125,9 +131,10 @@ class NextRun(PlannedRun):
             f"they differ by {self.separation:.1f} standard deviations of the noise."
         )
 
-    def words(self, *, robot: bool = False) -> str:
+    def words(self, freedom: Freedom = ANGLE, *, robot: bool = False) -> str:
         """The run to make, in words: arguments as in `conditions`."""
-        return f"{self.conditions(robot=robot)} (the answers differ by {self.separation:.0f} standard deviations)"
+        made = self.conditions(freedom, robot=robot)
+        return f"{made} (the answers differ by {self.separation:.0f} standard deviations)"
 
 
 @dataclass(frozen=True)
@@ -230,6 +237,11 @@ def remaining(fit: Fit, runs: list[RunData], angle: float) -> Array:
 
 
 OTHER_INPUT = "record a run with another input, such as half the amplitude or another band of frequencies"
+
+
+def _step_of_release(similarity: Similarity) -> float:
+    """A power of ten: 0.01 rad of the similar rig, or less."""
+    return float(10.0 ** math.floor(math.log10(similarity.own(0.01, "rad"))))
 
 
 def _adjustable(value: float, step: float) -> float:

@@ -179,7 +179,7 @@ def rival_lines(answer: Findings) -> list[str]:
             if decided
             else "A run that would distinguish the likely answers"
         )
-        lines.append(f"{which}: {run.words(robot=answer.found.robot)}.")
+        lines.append(f"{which}: {run.words(answer.freedom, robot=answer.found.robot)}.")
     elif rivals and answer.found.driven:
         lines.append(f"To distinguish them, {OTHER_INPUT}.")
     elif rivals:
@@ -195,7 +195,8 @@ def _telling_apart(answer: Findings) -> Iterator[NextStep]:
     run = run_to_make(answer)
     if run is not None and answer.ambiguous_with:
         yield NextStep(
-            f"Make one more run: {run.conditions(robot=answer.found.robot)}", f"settles which it is{gain}"
+            f"Make one more run: {run.conditions(answer.freedom, robot=answer.found.robot)}",
+            f"settles which it is{gain}",
         )
     yield from choice_steps(answer.found.choices)
 
@@ -211,7 +212,7 @@ def _deciding(answer: Findings) -> Iterator[NextStep]:
     run, robot = run_to_make(answer), answer.found.robot
     if run is not None:
         yield NextStep(
-            f"Make one more run: {run.conditions(robot=robot)}",
+            f"Make one more run: {run.conditions(answer.freedom, robot=robot)}",
             f"decides between the likely answers{_narrower(answer, 'rivals')}",
         )
         return
@@ -264,7 +265,8 @@ def _narrowing(answer: Findings) -> Iterator[NextStep]:
     for source, gains in found.items():
         what = _NARROWS[source].format(other="inputs" if answer.found.driven else "release angles")
         if source == "noise" and runs is not None:
-            what = f"Make {counted(runs.count, 'more run')}: {runs.conditions(robot=answer.found.robot)}"
+            conditions = runs.conditions(answer.freedom, robot=answer.found.robot)
+            what = f"Make {counted(runs.count, 'more run')}: {conditions}"
         yield NextStep(what, listed(gains))
 
 

@@ -78,7 +78,8 @@ def patch_line(model: PatchedModel | None, judged: Judged) -> str:
             f"The patched model, simulated by MuJoCo, explains {closed} of the gap {model.closed_on}; the fit "
             f"itself explains {by_fit}."
         )
-    zero = f"{'−' if model.zero_rad < 0.0 else '+'} {reading_shown(abs(model.zero_rad), 3)}"
+    size = reading_shown(abs(model.zero_rad), 3, next(iter(judged.freedom.shown)))
+    zero = f"{'−' if model.zero_rad < 0.0 else '+'} {size}"
     return f"{said} The reading is the position of {model.joint} {zero}."
 
 

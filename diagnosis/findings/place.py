@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from math import degrees
 from typing import Any, Final
 
 from diagnosis.findings.finding import Judged, Picture
@@ -22,7 +21,16 @@ from diagnosis.model.fact import Fact
 from diagnosis.where.described import BETWEEN_RUNS, Nowhere, PlaceFound, Where
 from diagnosis.where.maps import Maps
 from identification.show.blocks import TextTable
-from identification.show.numbers import p_text, part, plain, reading_shown, share, significant, unit_shown
+from identification.show.numbers import (
+    joined_mark,
+    motion_shown,
+    p_text,
+    part,
+    plain,
+    reading_shown,
+    share,
+    significant,
+)
 from tunnel_sim.effects.capabilities import SecondOscillation
 from tunnel_sim.effects.registry import effect_class
 
@@ -83,7 +91,7 @@ def where_words(where: Where, place: PlaceFound | Nowhere | None, judged: Judged
     if isinstance(place, Nowhere):
         return _nowhere(place)
     parts = [f"{_which_runs(where, place)}."]
-    if places := _places(where, place):
+    if places := _places(where, place, judged.misfit.unit):
         most = part(judged.settings.where.interval_share).capitalize()
         parts.append(f"{most} of the gap lie {', '.join(places)}.")
     if place.bands:
@@ -148,14 +156,19 @@ def _which_runs(where: Where, place: PlaceFound) -> str:
     return text
 
 
-def _places(where: Where, place: PlaceFound) -> list[str]:
-    """The intervals that locate the gap."""
+def _places(where: Where, place: PlaceFound, unit: str) -> list[str]:
+    """The intervals that locate the gap.
+
+    Args:
+        unit: of the readings.
+    """
     places = []
     if "time_s" in place.narrow and where.time_s is not None:
         places.append("between {:.1f} and {:.1f} s of the record".format(*where.time_s))
     if "amplitude_rad" in place.narrow and where.amplitude_rad is not None:
-        least, most = (f"{float(f'{degrees(one):.2g}'):g}" for one in where.amplitude_rad)
-        places.append(f"at amplitudes from {least}° to {most}°")
+        mark, factor = motion_shown(unit)
+        least, most = (f"{float(f'{factor * one:.2g}'):g}{joined_mark(mark)}" for one in where.amplitude_rad)
+        places.append(f"at amplitudes from {least} to {most}")
     if "frequency_hz" in place.narrow and where.frequency_hz is not None:
         places.append("at {:.2f} to {:.2f} Hz".format(*where.frequency_hz))
     return places
@@ -201,11 +214,11 @@ _UNDETERMINED = "not shown by the residuals alone"
 
 def place_rows(where: Where, judged: Judged) -> tuple[tuple[str, str], ...]:
     """The place of the gap, field by field."""
-    degree = unit_shown("rad")[1]
+    mark, degree = motion_shown(judged.misfit.unit)
     rows = [("Runs that show it", ", ".join(where.runs) or "–")]
     for label, interval, factor, unit in (
         ("Time", where.time_s, 1.0, " s"),
-        ("Amplitude", where.amplitude_rad, degree, "°"),
+        ("Amplitude", where.amplitude_rad, degree, joined_mark(mark)),
         ("Frequency", where.frequency_hz, 1.0, " Hz"),
     ):
         ends = [significant(factor * value, 3) for value in interval or ()]
@@ -297,13 +310,13 @@ def where_pictures(where: Where, maps: Maps | None) -> tuple[Picture, ...]:
             "the residuals with the fitted equation of motion. Empty cells are within three standard "
             "deviations of zero. The part that the nominal coefficients absorb is not shown.",
             "Map of the missing moment over angle and rate.",
-            partial(phase_plane_figure, maps.phase_plane),
+            partial(phase_plane_figure, maps.phase_plane, maps.unit),
         ),
         Picture(
             "where-moment",
             "Means of the missing moment, with 95 % bands. A dependence on the angle indicates stiffness; a "
             "dependence on the rate indicates damping.",
             "Mean of the missing moment against the angle and against the rate.",
-            partial(moment_figure, maps.phase_plane),
+            partial(moment_figure, maps.phase_plane, maps.unit),
         ),
     )

@@ -22,6 +22,7 @@ from identification.show.drawing import (
     colour_bar,
     faded,
 )
+from identification.show.numbers import motion_shown, unit_mark
 from identification.show.quantity import INTERVAL
 from identification.show.style import (
     COLOURS,
@@ -42,7 +43,7 @@ if TYPE_CHECKING:
 
 TIME = "time since the start of the record [s]"
 LEAST_POWER = 0.3  # of the noise: smaller values are drawn at the edge of the axis
-ANGLE, RATE = "angle β [°]", "rate β̇/ω [°]"
+ANGLE, RATE = "angle β [{}]", "rate β̇/ω [{}]"
 _MOST_CURVES = len(COLOURS)
 _LONG = 30  # characters of a label
 _LEGEND, _HANDLE = 62, 8  # characters: the width of the figure, and the line beside a label
@@ -55,7 +56,8 @@ def place_figure(cells: ExcessMap, misfit: Misfit) -> Figure:
     Cells within the noise are empty. The figure is small enough for a phone.
     """
     unit, size = misfit.scale()
-    rows = np.degrees(cells.amplitude_edges_rad)
+    mark, per_si = motion_shown(misfit.unit)
+    rows = per_si * cells.amplitude_edges_rad
     speeds = [] if cells.wind_speeds is None else cells.wind_speeds.tolist()
     columns = np.arange(len(speeds) + 1) - 0.5 if cells.time_edges_s is None else cells.time_edges_s
     sizes = np.vectorize(size, otypes=[float])(np.nan_to_num(cells.excess))
@@ -66,7 +68,7 @@ def place_figure(cells: ExcessMap, misfit: Misfit) -> Figure:
     mesh = axes.pcolormesh(columns, rows, shown, cmap=faded(BEFORE), vmin=0.0, vmax=top)
     if speeds:
         axes.set_xticks(range(len(speeds)), [f"{speed:g}" if speed else "off" for speed in speeds])
-    axes.set(xlabel="wind speed [m/s]" if speeds else TIME, ylabel="amplitude [°]")
+    axes.set(xlabel="wind speed [m/s]" if speeds else TIME, ylabel=f"amplitude [{mark}]")
     axes.set(xlim=(columns[0], columns[-1]), ylim=(0.0, rows[-1]))
     colour_bar(fig, mesh, axes, label=f"root mean square misfit [{unit}]")
     return fig
@@ -108,12 +110,13 @@ def profiles_figure(where: Where, maps: Maps) -> Figure:
 
     The shaded intervals contain four fifths of the gap.
     """
-    swings = None if where.amplitude_rad is None else np.degrees(where.amplitude_rad).tolist()
+    mark, per_si = motion_shown(maps.unit)
+    swings = None if where.amplitude_rad is None else [per_si * end for end in where.amplitude_rad]
     fig = figure(NARROW, 6.0)
     by_time, moment, by_amplitude = fig.subplots(3, 1, height_ratios=(1.3, 0.8, 1.3))
     for axes, values, bounds, interval in (
         (by_time, maps.time, maps.time.edges_s, where.time_s),
-        (by_amplitude, maps.amplitude, np.degrees(maps.amplitude.edges_rad), swings),
+        (by_amplitude, maps.amplitude, per_si * maps.amplitude.edges_rad, swings),
     ):
         mean, std = values.excess, values.std
         if interval is not None:
@@ -130,7 +133,7 @@ def profiles_figure(where: Where, maps: Maps) -> Figure:
     moment.set(xlim=(0.0, edges[-1]), ylim=(0.0, 1.05 * max(float(share.max()), 20.0)))
     moment.set(xlabel=TIME, ylabel="missing moment\n[% of its energy]")
     grid(moment)
-    by_amplitude.set_xlabel("amplitude of the motion [°]")
+    by_amplitude.set_xlabel(f"amplitude of the motion [{mark}]")
     return fig
 
 
@@ -172,11 +175,16 @@ def spectrum_axis(given: ExcessSpectrum) -> tuple[Array, Array]:
 
 
 @styled
-def phase_plane_figure(plane: PhasePlane | None) -> Figure | None:
-    """The missing moment over angle and rate; None where it is not known."""
+def phase_plane_figure(plane: PhasePlane | None, reading: str) -> Figure | None:
+    """The missing moment over angle and rate; None where it is not known.
+
+    Args:
+        reading: unit of the readings.
+    """
     if plane is None:
         return None
-    low, *_, high = np.degrees(plane.edges_rad).tolist()
+    mark, per_si = motion_shown(reading)
+    low, *_, high = (per_si * plane.edges_rad).tolist()
     clear, reach, unit, _ = plane_cells(plane)
     fig = figure(NARROW, 4.4)
     axes = fig.add_subplot()
@@ -184,17 +192,22 @@ def phase_plane_figure(plane: PhasePlane | None) -> Figure | None:
         clear, origin="lower", extent=(low, high, low, high), cmap=faded(AFTER, BEFORE),
         vmin=-reach, vmax=reach, interpolation="nearest",
     )  # fmt: skip
-    axes.set(xlabel=ANGLE, ylabel=RATE)
+    axes.set(xlabel=ANGLE.format(mark), ylabel=RATE.format(mark))
     colour_bar(fig, image, axes, location="top", label=f"missing moment [{unit}]", shrink=0.9, aspect=40)
     return fig
 
 
 @styled
-def moment_figure(plane: PhasePlane | None) -> Figure | None:
-    """Means of the missing moment over all rates and over all angles; None where it is not known."""
+def moment_figure(plane: PhasePlane | None, reading: str) -> Figure | None:
+    """Means of the missing moment over all rates and over all angles; None where it is not known.
+
+    Args:
+        reading: unit of the readings.
+    """
     if plane is None:
         return None
-    edges = np.degrees(plane.edges_rad)
+    mark, per_si = motion_shown(reading)
+    edges = per_si * plane.edges_rad
     _, _, unit, factor = plane_cells(plane)
     fig = figure(NARROW, 5.0)
     centre = 0.5 * (edges[1:] + edges[:-1])
@@ -202,7 +215,7 @@ def moment_figure(plane: PhasePlane | None) -> Figure | None:
         fig.subplots(2, 1),
         (plane.by_angle, plane.by_rate),
         (plane.by_angle_std, plane.by_rate_std),
-        (ANGLE, RATE),
+        (ANGLE.format(mark), RATE.format(mark)),
         ("rates", "angles"),
         strict=True,
     ):
@@ -223,7 +236,7 @@ def plane_cells(plane: PhasePlane) -> tuple[Array, float, str, float]:
     """
     moment, std = plane.moment, plane.std
     known = np.abs(moment[np.isfinite(moment)])
-    unit, factor = plane.unit.replace("rad/s2", "rad/s²"), 1.0
+    unit, factor = unit_mark(plane.unit), 1.0
     if known.size and known.max() < 0.1:
         unit, factor = f"10⁻³ {unit}", 1e3
     reach = float(np.quantile(known, 0.98)) * factor if known.size else 1.0
@@ -239,11 +252,12 @@ def backbone_figure(where: Where, maps: Maps) -> Figure:
     chosen = (named + [curve for curve in curves if curve not in named])[:_MOST_CURVES]
     labels = {run.id: figure_text(label) for run, label in zip(maps.runs, run_labels(maps.runs), strict=True)}
     fig = figure(NARROW, 7.0)
+    mark, per_si = motion_shown(maps.unit)
     frequency, damping = fig.subplots(2, 1)
     drawn: dict[Axes, list[tuple[Array, Array]]] = {frequency: [], damping: []}
     for index, curve in enumerate(chosen):
         order = np.argsort(curve.amplitude_rad)
-        x, nominal = np.degrees(curve.amplitude_rad[order]), curve.nominal_frequency_hz
+        x, nominal = per_si * curve.amplitude_rad[order], curve.nominal_frequency_hz
         colour, marker = COLOURS[index], MARKERS[(index + index // len(MARKERS)) % len(MARKERS)]
         shift = 100.0 * (curve.frequency_hz / nominal - 1.0)
         change = 1e3 * (curve.zeta - curve.nominal_zeta)
@@ -259,7 +273,7 @@ def backbone_figure(where: Where, maps: Maps) -> Figure:
     damping.set_ylabel("damping ratio minus\nthe nominal one [10⁻³]")
     for axes, pairs in drawn.items():
         axes.axhline(0.0, color=INK, linewidth=1.0)
-        axes.set_xlabel("amplitude [°]")
+        axes.set_xlabel(f"amplitude [{mark}]")
         grid(axes)
         if pairs:
             limit_to_known(axes, *(np.concatenate(column) for column in zip(*pairs, strict=True)))

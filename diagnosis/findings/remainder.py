@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from math import degrees
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -27,6 +26,7 @@ from identification.show.blocks import TextTable
 from identification.show.drawing import AFTER, BEFORE, NARROW, colour_bar, faded
 from identification.show.numbers import (
     change_up_to,
+    joined_mark,
     listed,
     part,
     percent,
@@ -41,6 +41,7 @@ from identification.show.style import figure, grid, styled
 from tunnel_sim.effects.capabilities import AtRandom
 from tunnel_sim.effects.registry import known_effects
 from tunnel_sim.vocabulary.dimensions import beside
+from tunnel_sim.vocabulary.freedom import freedom_of_unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -280,7 +281,7 @@ def _line(found: Line | None) -> list[str]:
     frequency = with_std(found.frequency_hz, found.frequency_std_hz)
     mark, factor = unit_shown(found.unit)
     amplitude = with_std(factor * found.amplitude, factor * found.amplitude_std)
-    amplitude += mark if mark == "°" else f" {mark}"
+    amplitude += joined_mark(mark)
     return [
         f"The line is at {frequency} Hz. Its amplitude is {amplitude} (root mean square over the runs). Chance "
         "alone shows a line in less than "
@@ -323,8 +324,12 @@ def closable_table(found: Closable | None) -> TextTable:
     return TextTable(title, ("kind of law", "share", "held out"), tuple(rows), ("share",))
 
 
-def law_pictures(found: Closable | None) -> tuple[Picture, ...]:
-    """The law without a formula; none without one."""
+def law_pictures(found: Closable | None, reading: str) -> tuple[Picture, ...]:
+    """The law without a formula; none without one.
+
+    Args:
+        reading: unit of the readings.
+    """
     if found is None or found.curve is None:
         return ()
     caption = (
@@ -332,25 +337,28 @@ def law_pictures(found: Closable | None) -> tuple[Picture, ...]:
         "band. The part that the coefficients and the zero of the model absorb is subtracted."
     )
     description = "The missing moment, or error of the reading, as a curve with its band or as a map."
-    return (Picture("law", caption, description, partial(law_figure, found.curve)),)
-
-
-_AXES = {
-    "angle": ("angle [°]", degrees(1.0)),
-    "rate": ("rate [°/s]", degrees(1.0)),
-    "time": ("time since the start [s]", 1.0),
-}
+    return (Picture("law", caption, description, partial(law_figure, found.curve, reading)),)
 
 
 @styled
-def law_figure(curve: Curve) -> Figure:
-    """The law without a formula, with its 95 % band; in a map, white cells are within it."""
+def law_figure(curve: Curve, reading: str) -> Figure:
+    """The law without a formula, with its 95 % band; in a map, white cells are within it.
+
+    Args:
+        reading: unit of the readings.
+    """
+    units = freedom_of_unit(reading).shown
+    motion, rate = [*units.values()][:2]
     shape = [len(axis) for axis in curve.places]
-    moment = curve.unit == "N m"
-    unit, factor = ("N m", 1.0) if moment else unit_shown("rad" if curve.unit == "rad" else "rad/s2")
+    unit, factor = units.get(curve.unit, (curve.unit, 1.0))  # a moment is shown as it is
     values, std = (factor * np.reshape(given, shape) for given in (curve.values, curve.std))
-    name = f"{'error of the reading' if curve.unit == 'rad' else 'missing moment'} [{unit}]"
-    (label, *others), scales = zip(*(_AXES[axis] for axis in curve.over), strict=True)
+    name = f"{'error of the reading' if curve.unit == next(iter(units)) else 'missing moment'} [{unit}]"
+    axes_by_name = {
+        "angle": (f"angle [{motion[0]}]", motion[1]),
+        "rate": (f"rate [{rate[0]}]", rate[1]),
+        "time": ("time since the start [s]", 1.0),
+    }
+    (label, *others), scales = zip(*(axes_by_name[axis] for axis in curve.over), strict=True)
     places = [scale * np.asarray(axis) for scale, axis in zip(scales, curve.places, strict=True)]
     fig = figure(NARROW, 3.2)
     axes = fig.add_subplot()

@@ -260,13 +260,15 @@ class RunRepeatability:
                 for value, std, band in (run.deviation("frequency"), run.deviation("damping"))
             ]
             remark = "deviates far beyond the others" if run.id == self.outlier else ""
-            rows.append((run.id, "on" if run.windy else "off", *deviations, remark))
-        heads = ("run", "wind", "frequency [%]", "damping [%]", "remark")
+            wind = ("on" if run.windy else "off",) if judged.freedom.windy else ()
+            rows.append((run.id, *wind, *deviations, remark))
+        numbers = ("frequency [%]", "damping [%]")
+        heads = ("run", *["wind"] * judged.freedom.windy, *numbers, "remark")
         last = None if any(row[-1] for row in rows) else -1
         title = "Every run against the model"
         if known:
             title += ", and its scatter by chance (one standard deviation)"
-        return TextTable(title, heads[:last], tuple(row[:last] for row in rows), heads[2:4])
+        return TextTable(title, heads[:last], tuple(row[:last] for row in rows), numbers)
 
     def pictures(self) -> tuple[Picture, ...]:
         """Every run against the model; none for fewer than two runs."""

@@ -28,7 +28,7 @@ def diagnosis_schema() -> Schema:
     found["$defs"]["Maps"]["properties"]["friction"] = fields.pop("friction")
     fields |= {"schema_version": {"const": SCHEMA_VERSION}}
     fields |= _decision(found["$defs"].pop("Decision")) | _waterfall(found["$defs"].pop("Waterfall"))
-    found["required"] = sorted(fields)
+    found["required"] = sorted(fields.keys() - {"motion", "motion_scale"})  # of a displacement only
     return found
 
 

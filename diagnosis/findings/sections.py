@@ -69,6 +69,11 @@ def sections(answer: Findings, campaign: Campaign | None = None) -> tuple[Sectio
         campaign: adds the conditions of the runs.
     """
     blown = bool(campaign.in_wind) if campaign else answer.windy
+    found = _sections(answer, campaign, blown=blown)
+    return answer.freedom.texts(found, answer.names, answer.motion_scale)
+
+
+def _sections(answer: Findings, campaign: Campaign | None, *, blown: bool) -> tuple[Section, ...]:
     listed = (
         Head.of(answer).section,
         Section("answer", "The answer", (Paragraph(str(answer.verdict)),)),
@@ -185,7 +190,7 @@ def _how_far(answer: Findings, campaign: Campaign | None) -> Section:
 
 
 def _closable(answer: Findings) -> Section:
-    drawn = figures(law_pictures(answer.closable))
+    drawn = figures(law_pictures(answer.closable, answer.misfit.unit))
     return Section(
         "closable",
         "What could explain the residual gap",
@@ -332,10 +337,11 @@ def diagnosis_brief(answer: Findings) -> str:
     )
     closed = f"; {share(gap.closed)} explained {gap.closed_on}" if answer.names_effects else ""
     likely = probability(first.probability)
-    return (
+    return answer.freedom.words(
         f"Diagnosis of {answer.campaign!r}: {undecided}{named} (probability {likely})\n"
         f"  gap {size}{closed}\n"
-        "  print() shows all; .plot(), .write_report(path), .to_frame()"
+        "  print() shows all; .plot(), .write_report(path), .to_frame()",
+        answer.names,
     )
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from diagnosis.findings.hidden import Hidden
 from diagnosis.findings.repeatability import RunRepeatability
+from diagnosis.model.fact import Fact
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.similarity import Similarity
 from identification.show.quantity import Quantity
@@ -70,6 +71,13 @@ def sized_coefficients(found: Mapping[str, Quantity], rig: RigProperties) -> dic
 def own_estimates(values: Mapping[str, Quantity], similarity: Similarity) -> dict[str, Quantity]:
     """Estimates by name, in the measured campaign's units."""
     return {name: own_estimate(value, similarity) for name, value in values.items()}
+
+
+def own_fact(given: Fact, similarity: Similarity) -> Fact:
+    """A fact whose figures in ``_rad``, which are readings, are in the measured campaign's units."""
+    factor = similarity.own(1.0, similarity.reading)
+    own = {name: factor * value if name.endswith("_rad") else value for name, value in given.figures.items()}
+    return replace(given, figures=own)
 
 
 def own_repeatability(given: RunRepeatability, similarity: Similarity) -> RunRepeatability:

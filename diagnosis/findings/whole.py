@@ -54,6 +54,7 @@ from tunnel_sim.files.reading import as_described, check_shape
 from tunnel_sim.files.writing import as_json
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError, one_line
+from tunnel_sim.vocabulary.freedom import ANGLE, FREEDOMS, Freedom, Motion
 
 SCHEMA_VERSION = 1
 _LAST = (
@@ -132,6 +133,10 @@ class Findings:
         found: facts for the words, beside the numbers.
         friction: of the answer against the rate, which is part of ``maps`` in the JSON; None without friction.
         data: the runs, which are not part of the JSON; None for an answer that was not made by `diagnose`.
+        motion: ``displacement`` of a linear freedom, with m, N and kg in place of rad, N m and kg m² also in fields
+            with ``_rad`` in their names; the JSON of an angle has neither it nor ``motion_scale``.
+        motion_scale: of the motion as it was computed: constants in the forms of effects, such as 0.2 rad, stand
+            for as many metres divided by it.
     """
 
     campaign: str
@@ -168,6 +173,18 @@ class Findings:
     by_run: CausesByRun | None = None
     further_runs: FurtherRuns | None = None
     data: Annotated[Campaign | None, UNWRITTEN] = field(default=None, compare=False)
+    motion: Motion = "angle"
+    motion_scale: float = 1.0
+
+    @property
+    def freedom(self) -> Freedom:
+        """The freedom of the body, which names units and words."""
+        return FREEDOMS[self.motion]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the user's: of the campaign and its runs."""
+        return self.campaign, *(run.id for run in self.gap.runs)
 
     @property
     def findings(self) -> dict[str, Finding]:
@@ -187,10 +204,10 @@ class Findings:
             *(self.friction.pictures() if self.friction else ()),
             *self.repeated.pictures(),
             *closure_pictures(self.gap, self.maps),
-            *law_pictures(self.closable),
+            *law_pictures(self.closable, self.misfit.unit),
             *(one for finding in self.findings.values() for one in finding.pictures(self)),
         )
-        return {one.name: one for one in drawn}
+        return {one.name: one.of(self.freedom, self.names) for one in drawn}
 
     @property
     def settings(self) -> Settings:
@@ -275,6 +292,8 @@ class Findings:
     def to_json_dict(self) -> dict[str, Any]:
         """The answer in JSON's types, by the published schema."""
         own = {name: as_json(getattr(self, name)) for name in (*_LAST, *finding_kinds())}
+        if self.freedom is not ANGLE:
+            own |= {"motion": self.motion, "motion_scale": self.motion_scale}
         if self.maps is not None:
             own["maps"] = {**own["maps"], "friction": as_json(self.friction)}
         return {

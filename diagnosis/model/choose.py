@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from diagnosis.model.carriage import Carriage
 from diagnosis.model.loose import LooseBody
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.rig import PerInertia, SpringModel
@@ -9,7 +10,7 @@ from diagnosis.model.servo import Servo, ServoPerInertia
 from tunnel_sim.vocabulary.campaign import Campaign
 
 #: In the order in which they are asked whether a campaign is theirs.
-KINDS: tuple[type[NominalModel], ...] = (ServoPerInertia, Servo, LooseBody, PerInertia, SpringModel)
+KINDS: tuple[type[NominalModel], ...] = (ServoPerInertia, Servo, LooseBody, PerInertia, Carriage, SpringModel)
 
 
 def nominal_model(campaign: Campaign, given: NominalModel | None = None) -> NominalModel:

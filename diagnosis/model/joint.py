@@ -15,7 +15,7 @@ from diagnosis.model.parameters import Parameter
 from diagnosis.model.rig import SpringModel
 from diagnosis.model.run_data import PreparedRuns, RunData
 from diagnosis.model.servo import OF_GEAR
-from diagnosis.model.similarity import Similarity, frequency
+from diagnosis.model.similarity import Similarity, reach
 from diagnosis.model.starts import Shown, ShownResponse
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.capabilities import Backlash
@@ -23,6 +23,7 @@ from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.physics.run_settings import SettingsTable
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.errors import TunnelError, one_line
+from tunnel_sim.vocabulary.freedom import DISPLACEMENT
 from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Actuator, JointLaw
@@ -37,7 +38,6 @@ _OF_GEAR = (
     "Gravity holds the joint. Play would be in the gears between motor and link, which requires a model of two "
     "bodies, so these effects are not tried: {}."
 )
-_SLIDE = "The joint slides: read m for rad, N for N m and kg for kg m2 throughout."
 
 
 @dataclass(frozen=True)
@@ -51,6 +51,7 @@ class _OfLaw(NominalModel):
     law: JointLaw = field(kw_only=True)
 
     of_robot: ClassVar[bool] = True
+    own_size: ClassVar[bool] = True
     resonance_known: ClassVar[bool] = True
 
     @property
@@ -138,10 +139,6 @@ class _OfLaw(NominalModel):
     def with_lead(self, lead: float) -> NominalModel:
         """This model with another lead, s."""
         return replace(self, law=replace(self.law, lead=lead))
-
-    def notes(self) -> tuple[str, ...]:
-        """How to read the units of a joint that slides."""
-        return (_SLIDE,) if self.law.slide else ()
 
     def gain_words(self) -> str:
         """The gain of the actuator, in a sentence."""
@@ -276,16 +273,6 @@ class LooseJoint(_OfLaw, LooseBody):
         return {name: value for name, value in self.law.held.items() if name != "zero"}
 
 
-def reach(campaign: Campaign) -> float:
-    """The greatest displacement in the records, rad; by way of the frequency where the sensor reads a rate."""
-    found = []
-    for run in campaign.runs:
-        readings = run.record.yaw_rad[np.isfinite(run.record.yaw_rad)]
-        turn = 2.0 * np.pi * frequency(run.record) if campaign.sensor.derivative else 1.0
-        found.append(float(np.max(np.abs(readings - np.mean(readings)))) / turn**campaign.sensor.derivative)
-    return max(found)
-
-
 def recorded(campaign: Campaign, actuator: str | None = None) -> Recorded:
     """The motion of a joint by its records: its range, and whether a control drives it.
 
@@ -330,7 +317,11 @@ def with_law(campaign: Campaign, law: JointLaw) -> tuple[Campaign, NominalModel]
         replace(run, spring_stiffness=law.stiffness, drive=run.drive and _of_joint(run, run.drive, law))
         for run in campaign.runs
     )
-    found = replace(campaign, runs=runs, law=law)
+    if campaign.sensor.motion == DISPLACEMENT.motion and not law.slide:
+        what = "the records are of a displacement, and the joint of the model is a hinge"
+        raise TunnelError(what, where="--model", remedy="name a slide, or leave motion out of [sensor]")
+    sensor = replace(campaign.sensor, motion=DISPLACEMENT.motion if law.slide else None)
+    found = replace(campaign, sensor=sensor, runs=runs, law=law)
     if "gain" in law.free and law.actuator is not None:
         return found, ServoJoint(law=law, kp=-law.actuator.servo[1], held_at=law.rest)
     return found, (LooseJoint if found.unrestrained else Joint)(law=law)

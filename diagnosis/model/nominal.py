@@ -57,12 +57,14 @@ class NominalModel:
         mean_speed: of the campaign's runs with the wind on, m/s.
         own_zeros: whether every run has a zero of the sensor of its own.
         unknown_gain: whether a run of the campaign has an input whose gain is fitted.
+        in_air: whether the air may add stiffness and damping.
     """
 
     windy: bool = False
     mean_speed: float = REFERENCE_SPEED
     own_zeros: bool = False
     unknown_gain: bool = False
+    in_air: bool = True
 
     #: Whether moments are per unit inertia, since no run shows them in N m.
     per_inertia: ClassVar[bool] = False
@@ -70,6 +72,8 @@ class NominalModel:
     restored: ClassVar[bool] = True
     #: Whether the body is the joint of a machine, whose springs and wind cannot be chosen.
     of_robot: ClassVar[bool] = False
+    #: Whether it states moments of the angle at its own size, so that the angle cannot be scaled.
+    own_size: ClassVar[bool] = False
     #: Whether the resonance of a driven run is known, and need not show in it.
     resonance_known: ClassVar[bool] = False
     #: Units of the coefficients that it states, by name.
@@ -91,6 +95,7 @@ class NominalModel:
             mean_speed=mean_wind_speed((run.wind_speed for run in campaign.runs), REFERENCE_SPEED),
             own_zeros=campaign.sensor.zero == "per_run" and self.restored and "zero" not in self.held,
             unknown_gain=any(map(self.fits_gain, campaign.inputs)),
+            in_air=campaign.sensor.freedom.windy and not self.of_robot,
         )
 
     def among(self, runs: Sequence[RunData]) -> NominalModel:
@@ -400,7 +405,7 @@ class NominalModel:
         """The limits of these runs, as clauses; limits of every campaign come last."""
         speeds, found = data.wind_speeds, [*self.unseen(data)]
         if not self.windy:
-            found += [] if self.of_robot else ["any effect of the air: there is no run with the wind on"]
+            found += ["any effect of the air: there is no run with the wind on"] if self.in_air else []
         elif len(speeds) < 2:
             found.append(
                 "a lag, a wind-speed offset or a dependence of Cnβ on the speed: there is one wind speed only, and "

@@ -8,7 +8,7 @@ import numpy as np
 
 from diagnosis.model.choose import nominal_model
 from diagnosis.model.nominal import NominalModel
-from diagnosis.model.similarity import REFERENCE_FREQUENCY, Similarity, free_frequency
+from diagnosis.model.similarity import REFERENCE_FREQUENCY, Similarity, free_frequency, reach
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties
 from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.record import Record
@@ -29,10 +29,14 @@ def similar_campaign(campaign: Campaign, model: NominalModel | None = None) -> t
     rig, sensor = campaign.rig, campaign.sensor
     still = campaign.in_still_air or campaign.runs
     time = float(np.median([free_frequency(run, sensor.derivative) for run in still])) / REFERENCE_FREQUENCY
-    moment = (model or nominal_model(campaign)).moment_factor(campaign, time)
+    model = model or nominal_model(campaign)
+    moment = model.moment_factor(campaign, time)
     rest = float(np.median([np.mean(run.record.yaw_rad) for run in campaign.runs]))
     unit = ("rad", "rad/s", "rad/s2")[sensor.derivative]
-    change = Similarity(time, moment, rest if unit == "rad" else 0.0, unit)
+    freedom = sensor.freedom
+    own_size = freedom.turns or model.own_size or model.moment
+    angle = 1.0 if own_size else freedom.scale(reach(campaign))
+    change = Similarity(time, moment, rest if unit == "rad" else 0.0, unit, angle)
 
     def known(value: float | None, unit: str) -> float | None:
         return None if value is None else change.similar(value, unit)
@@ -63,5 +67,6 @@ def similar_campaign(campaign: Campaign, model: NominalModel | None = None) -> t
 def _drive(drive: Input, change: Similarity) -> Input:
     """An input at the times of its record."""
     if drive.kind.takes_gain:  # the values stay as they are
-        return dataclasses.replace(drive, gain=None if drive.gain is None else drive.gain * change.moment)
+        gain = None if drive.gain is None else change.similar(drive.gain, "N m")
+        return dataclasses.replace(drive, gain=gain)
     return dataclasses.replace(drive, values=drive.values * change.similar(1.0, drive.kind.unit))

@@ -3,7 +3,7 @@
 The equation of motion keeps its form when time is multiplied by s, moments by m, lengths along the flow by s and
 the frontal area by m/s: inertias then change by m s², damping by m s, while angles, wind speeds, air densities, Cnβ
 and Cnr stay as they are. So every interval, frequency and moment inside the diagnosis refers to one rig, whatever
-the time scale of the rig that was measured.
+the time scale of the rig that was measured. A displacement is diagnosed as an angle of a usual size.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ import numpy as np
 
 from identification.signal.forcing import driven_start
 from identification.signal.frequency import peak_of_swing
-from tunnel_sim.vocabulary.campaign import Run
-from tunnel_sim.vocabulary.dimensions import dimension
+from tunnel_sim.vocabulary.campaign import Campaign, Run
+from tunnel_sim.vocabulary.dimensions import angle_power, dimension
 from tunnel_sim.vocabulary.record import Record, evenly_spaced
 
 REFERENCE_FREQUENCY = 2.0  # of the similar rig, Hz
@@ -33,12 +33,14 @@ class Similarity:
         moment: m, the factor on moments, dimensionless.
         rest: angle taken off all readings, rad.
         reading: unit of the readings.
+        angle: the factor on angles, and on moments beside theirs; 1 but for displacements.
     """
 
     time: float = 1.0
     moment: float = 1.0
     rest: float = 0.0
     reading: str = "rad"
+    angle: float = 1.0
 
     @property
     def area(self) -> float:
@@ -66,9 +68,10 @@ class Similarity:
     def _factor(self, unit: str) -> float:
         """Speeds stay as they are, so a length changes as a time does; a mass then changes as a moment does."""
         kg, metres, seconds = dimension(unit)
+        motion = self.angle ** angle_power(unit)
         if kg == seconds == 0.0:  # the rig's sizes have rules of their own
-            return 1.0
-        return float(self.moment**kg * self.time ** (metres + seconds))
+            return float(motion)
+        return float(self.moment**kg * self.time ** (metres + seconds) * motion)
 
 
 AS_MEASURED = Similarity()
@@ -112,6 +115,16 @@ def free_frequency(run: Run, derivative: int = 0) -> float:
     if found is None or found[1] <= 0.0:
         return frequency(run.record)
     return float(np.sqrt(found[1])) / (2.0 * np.pi)
+
+
+def reach(campaign: Campaign) -> float:
+    """The greatest displacement in the records, rad; by way of the frequency where the sensor reads a rate."""
+    found = []
+    for run in campaign.runs:
+        readings = run.record.yaw_rad[np.isfinite(run.record.yaw_rad)]
+        turn = 2.0 * np.pi * frequency(run.record) if campaign.sensor.derivative else 1.0
+        found.append(float(np.max(np.abs(readings - np.mean(readings)))) / turn**campaign.sensor.derivative)
+    return max(found)
 
 
 def response_to_input(run: Run, derivative: int = 0) -> tuple[float, float, float] | None:

@@ -26,7 +26,7 @@ from diagnosis.likelihood.partial import fit_seen
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.data import FOLDS
 from diagnosis.model.fact import Fact
-from diagnosis.model.joint import reach
+from diagnosis.model.similarity import reach
 from diagnosis.patch.elements import Control, DryFriction, FoundLaw, Inertia
 from diagnosis.patch.fitted_law import FittedLaw
 from diagnosis.patch.written_model import EngineModel, NativeClosure, NativeForm, PatchedModel

@@ -67,7 +67,7 @@ class Backbone:
 def backbones(fit: Fit) -> list[Backbone]:
     """The backbone of every run, by a fit of the nominal model, in the measured rig's units."""
     curves = []
-    seconds, hertz = (fit.problem.data.similarity.own(1.0, unit) for unit in ("s", "Hz"))
+    seconds, hertz, radians = (fit.problem.data.similarity.own(1.0, unit) for unit in ("s", "Hz", "rad"))
     for index, run in enumerate(fit.problem.data.runs):
         inertia, damping, stiffness = linear_coefficients(fit, index)
         stiffness = fit.problem.data.model.restoring(inertia, stiffness)
@@ -90,7 +90,7 @@ def backbones(fit: Fit) -> list[Backbone]:
         backbone = Backbone(
             run.id,
             np.array([run.start + w.start_s + 0.5 * w.duration_s for w in windows]) * seconds,
-            np.array([w.amplitude.value / w.omega_n.value**run.derivative for w in windows]),
+            np.array([w.amplitude.value / w.omega_n.value**run.derivative for w in windows]) * radians,
             np.array([w.omega_n.value for w in windows]) / (2.0 * np.pi) * hertz,
             np.array([w.omega_n.std for w in windows]) / (2.0 * np.pi) * hertz,
             np.array([w.zeta.value for w in windows]),
@@ -248,6 +248,7 @@ def phase_plane(fit: Fit, run_ids: tuple[str, ...]) -> PhasePlane | None:
         values.reshape(_BINS, _BINS) for values in _binned(runs, cells, _BINS * _BINS, factor)
     )
     by_angle, by_rate = _binned(runs, columns, _BINS, factor), _binned(runs, rows, _BINS, factor)
+    edges = edges * data.similarity.own(1.0, "rad")
     return PhasePlane(edges, plane, plane_std, *by_angle, *by_rate, unit, tuple(name for name, _ in found))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -125,9 +126,10 @@ def survey(nominal: Fit, scaled: Fit, excesses: list[RunExcess], chosen: tuple[s
         for run, time, left in zip(runs, samples.time, scaled.residuals, strict=True)
     ]
     starts = [float(amplitude[0]) for amplitude in samples.amplitude]
-    seconds, hertz = similarity.own(1.0, "s"), similarity.own(1.0, "Hz")
+    seconds, hertz, radians = (similarity.own(1.0, unit) for unit in ("s", "Hz", "rad"))
     over_time = replace(samples.over(instants, samples.time), edges=instants * seconds)
     swings = samples.over(np.linspace(0.0, widest, _AMPLITUDE_BINS + 1), samples.amplitude)
+    swings = replace(swings, edges=swings.edges * radians)
     spectrum = _spectrum(excesses, edges)
     maps = Maps(
         runs=_run_maps(scaled, excesses, starts),
@@ -150,12 +152,16 @@ def survey(nominal: Fit, scaled: Fit, excesses: list[RunExcess], chosen: tuple[s
         ),
         bands=bands,
         lines=tuple(
-            replace(line, frequency_hz=similarity.own(line.frequency_hz, "Hz"))
+            replace(
+                line,
+                frequency_hz=similarity.own(line.frequency_hz, "Hz"),
+                amplitude_rad=similarity.own(line.amplitude_rad, similarity.reading),
+            )
             for line in residual_lines(excesses, runs, settings)
         ),
         backbones=tuple(backbones(nominal)),
         phase_plane=phase_plane(nominal, chosen),
-        grid=_grid(samples, runs, np.linspace(0.0, widest, _GRID_ROWS + 1), seconds),
+        grid=_grid(samples, runs, np.linspace(0.0, widest, _GRID_ROWS + 1), (radians, seconds)),
         unit=similarity.reading,
         traces=_traces(nominal, None, excesses),
     )
@@ -224,7 +230,7 @@ def _run_maps(fit: Fit, excesses: list[RunExcess], starts: list[float]) -> tuple
             id=run.id,
             spring_stiffness=None if run.spring_stiffness is None else own(run.spring_stiffness, "N m/rad"),
             wind_speed=run.wind_speed,
-            amplitude_rad=start,
+            amplitude_rad=own(start, "rad"),
             frequency_hz=own(excess.resonance, "Hz"),
             excess=excess.excess / run.block,
             std=excess.std / run.block,
@@ -240,6 +246,7 @@ def _groups(fit: Fit, excesses: list[RunExcess], starts: list[float]) -> tuple[G
     runs, similarity = fit.problem.data.runs, fit.problem.data.similarity
     levels = [(e.excess / run.block, e.std / run.block) for e, run in zip(excesses, runs, strict=True)]
     speeds = speed_groups(run.wind_speed for run in runs)
+    places = 2 + max(math.ceil(math.log10(similarity.angle)), 0)
     keys = {
         "wind": ["on" if run.wind_on else "off" for run in runs],
         "spring": [
@@ -249,7 +256,9 @@ def _groups(fit: Fit, excesses: list[RunExcess], starts: list[float]) -> tuple[G
             for run in runs
         ],
         "speed": [f"{speeds[run.wind_speed]:g} m/s" for run in runs],
-        "amplitude": [f"{0.05 * round(start / 0.05):.2f} rad" for start in starts],
+        "amplitude": [
+            f"{similarity.own(0.05 * round(start / 0.05), 'rad'):.{places}f} rad" for start in starts
+        ],
     }
 
     def first_number(label: str) -> tuple[float, str]:
@@ -275,8 +284,12 @@ def _times(fit: Fit, index: int) -> Array:
     return run.start + (np.arange(run.reading.size, dtype=np.float64) + 0.5) * run.interval
 
 
-def _grid(samples: _Samples, runs: Sequence[RunData], rows: Array, seconds: float) -> ExcessMap:
-    """Excess by amplitude and wind speed; by amplitude and time where the runs have one speed."""
+def _grid(samples: _Samples, runs: Sequence[RunData], rows: Array, units: tuple[float, float]) -> ExcessMap:
+    """Excess by amplitude and wind speed; by amplitude and time where the runs have one speed.
+
+    Args:
+        units: radian and second of the similar rig in the measured one's.
+    """
     setting = speed_groups(run.wind_speed for run in runs)
     speeds = sorted(set(setting.values()))
     shared = len(speeds) == 1
@@ -293,9 +306,9 @@ def _grid(samples: _Samples, runs: Sequence[RunData], rows: Array, seconds: floa
         power = [p[keep] for p, keep in zip(samples.power, kept, strict=True)]
         columns.append(replace(samples, power=power).over(rows, amplitude))
     return ExcessMap(
-        rows,
+        rows * units[0],
         None if shared else np.array(speeds),
-        edges * seconds if shared else None,
+        edges * units[1] if shared else None,
         np.stack([column.mean for column in columns], axis=1),
         np.stack([column.std for column in columns], axis=1),
     )

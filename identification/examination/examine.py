@@ -70,7 +70,7 @@ def _wide_swings(campaign: Campaign, remedy: str) -> tuple[Remark, ...]:
     sensor = campaign.sensor
     swings = {run.id: _swing(run.record, sensor.derivative) for run in campaign.runs}
     wide = tuple(name for name, swing in swings.items() if swing > np.pi)
-    if not wide or sensor.plausible is False:
+    if not wide or sensor.plausible is False or not sensor.freedom.turns:
         return ()
     what = f"the angle swings by up to ±{max(swings.values()):.3g} rad, more than half a turn"
     return (Remark(Outcome.NOTED, wide, what, remedy),)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification.show.style import styled
+from tunnel_sim.vocabulary.freedom import ANGLE, Freedom
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
@@ -43,6 +44,25 @@ _SIZE = re.compile(r' (width|height)="[^"]*"')
 _ID = re.compile(r'\bid="([^"]+)"')
 _COLOUR = re.compile("|".join(THEMED))
 _REFERENCE = re.compile(r'(href="#|url\(#)([^")]+)')
+
+
+def in_words(drawn: Figure, freedom: Freedom, names: Sequence[str]) -> Figure:
+    """A drawing whose texts are in the words of a freedom.
+
+    Args:
+        names: of the user's, which are kept.
+    """
+    if freedom is ANGLE:
+        return drawn
+    from matplotlib.ticker import FixedLocator
+
+    for axes in drawn.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            if isinstance(axis.get_major_locator(), FixedLocator):  # labels of categories
+                axis.set_ticklabels([freedom.words(one.get_text(), names) for one in axis.get_ticklabels()])
+    for text in drawn.findobj(lambda part: hasattr(part, "set_text") and hasattr(part, "get_text")):
+        text.set_text(freedom.words(text.get_text(), names))  # type: ignore[attr-defined]
+    return drawn
 
 
 def array(values: Sequence[float | None]) -> Array:

@@ -12,6 +12,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from tunnel_sim.vocabulary.dimensions import beside
+from tunnel_sim.vocabulary.freedom import FREEDOMS, freedom_of_unit
 
 if TYPE_CHECKING:
     from identification.show.quantity import Quantity
@@ -177,14 +178,18 @@ def for_people(value: float, std: float | None, unit: str) -> str:
         std: its standard deviation, in the same unit; None: not known.
         unit: as effects and documents write it.
     """
-    if unit == "rad":
+    if unit in _MOTIONS:
         mark, factor = unit_shown(unit)
+        mark = joined_mark(mark)
         value, std = factor * value, None if std is None else factor * std
     else:
         mark = unit_mark(beside(unit))
     last = 10.0 ** (math.floor(math.log10(abs(value))) - 2) if value else 0.0
     shown = significant(value, 3) if std is None or std < 0.5 * last else with_std(value, std)
     return f"{shown.replace('-', '−') if shown.startswith('-') else shown}{mark}"
+
+
+_MOTIONS = tuple(next(iter(one.shown)) for one in FREEDOMS.values())
 
 
 def part(share: float) -> str:
@@ -298,7 +303,17 @@ def change_up_to(size: float, given: Quantity) -> str:
 
 def unit_shown(unit: str) -> tuple[str, float]:
     """The mark of the displayed unit of readings, and the factor on values in the given unit."""
-    return {"rad": "°", "rad/s": "°/s", "rad/s2": "°/s²"}[unit], math.degrees(1.0)
+    return freedom_of_unit(unit).shown[unit]
+
+
+def motion_shown(unit: str) -> tuple[str, float]:
+    """The same of the motion itself, an angle or a displacement, where readings have a unit."""
+    return next(iter(freedom_of_unit(unit).shown.values()))
+
+
+def joined_mark(mark: str) -> str:
+    """The mark of a unit behind a number, with a blank before it where it needs one."""
+    return mark if mark == "°" else f" {mark}"
 
 
 def beside_noise(excess: float) -> str:
@@ -318,7 +333,7 @@ def reading_shown(value: float, digits: int, unit: str = "rad") -> str:
         digits: significant digits (a count).
     """
     mark, factor = unit_shown(unit)
-    return f"{significant(factor * value, digits) if value else '0'}{mark if mark == '°' else f' {mark}'}"
+    return f"{significant(factor * value, digits) if value else '0'}{joined_mark(mark)}"
 
 
 def held_out_excess(value: float) -> str:

@@ -21,6 +21,7 @@ from tunnel_sim.files.toml_input import load_toml, one_line, validate
 from tunnel_sim.files.writing import write_json, write_whole
 from tunnel_sim.vocabulary.campaign import needs_density
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.freedom import ANGLE, FREEDOMS, Freedom
 from tunnel_sim.vocabulary.inputs import without_spring_needs_input
 
 Cells = dict[str, dict[str, str]]
@@ -55,8 +56,14 @@ _SHORT = (
 def stated(session: Session) -> Cells:
     """The conditions in ``campaign.toml``."""
     document = _document(session)
-    rows = {run["id"]: _texts(run, RUN_KEYS) for run in document["runs"]}
-    return {RIG: _texts(document.get("rig", {}), RIG_KEYS), **rows}
+    own = freedom_in(document).own_keys
+    rows = {run["id"]: _texts(run, own(RUN_KEYS)) for run in document["runs"]}
+    return {RIG: _texts(document.get("rig", {}), own(RIG_KEYS)), **rows}
+
+
+def freedom_in(document: Mapping[str, Any]) -> Freedom:
+    """The freedom that a ``campaign.toml`` states."""
+    return FREEDOMS[document.get("sensor", {}).get("motion", ANGLE.motion)]
 
 
 def typed(session: Session) -> Cells:
@@ -84,7 +91,12 @@ def faults(cells: Cells, *, plausible: bool) -> Words:
                     plausible_values({key: value} if plausible else {}, where)
             except TunnelError as error:
                 faults_by_cell[row, key] = str(error)
-        if not row or texts["air_density"].strip() or (row, "wind_speed") in faults_by_cell:
+        if (
+            not row
+            or _DENSITY not in texts
+            or texts[_DENSITY].strip()
+            or (row, "wind_speed") in faults_by_cell
+        ):
             continue
         scales = (texts["spring_stiffness"], cells[RIG]["frontal_area"], cells[RIG]["reference_length"])
         speed = number(texts["wind_speed"], where) or 0.0
@@ -127,8 +139,9 @@ def save(session: Session, cells: Cells) -> Words:
     if wrong:
         write_json(session.draft, cells)
         return wrong
-    document["rig"] = _with(document.get("rig", {}), cells[RIG], RIG_KEYS)
-    document["runs"] = [_with(run, cells[run["id"]], RUN_KEYS) for run in document["runs"]]
+    own = freedom_in(document).own_keys
+    document["rig"] = _with(document.get("rig", {}), cells[RIG], own(RIG_KEYS))
+    document["runs"] = [_with(run, cells[run["id"]], own(RUN_KEYS)) for run in document["runs"]]
     if stated(session) != cells:
         _write(session, document)
     session.draft.unlink(missing_ok=True)
@@ -240,14 +253,17 @@ class ConditionsPage:
         self._cells = typed(session)
         self._runs = [row for row in self._cells if row != RIG]
         self._driven = driven_runs(session).issuperset(self._runs)
+        self._freedom = freedom_in(_document(session))
+        self._keys = self._freedom.own_keys(RUN_KEYS)
         ui.label(
             "Type, or paste a block from a spreadsheet into a cell. Valid values are saved at once in "
             f"{session.campaign / 'campaign.toml'}; nothing else of the campaign changes."
         ).classes("soft")
         if len(self._runs) > 1:
             with ui.element("div").classes("fields"):
-                keys = {key: label_of(Conditions, key) for key in RUN_KEYS}
-                self._key = ui.select(keys, label="Same for all runs", value="air_density").props("dense")
+                keys = {key: self._label(key) for key in self._keys}
+                usual = _DENSITY if _DENSITY in keys else self._keys[0]
+                self._key = ui.select(keys, label="Same for all runs", value=usual).props("dense")
                 self._value = ui.input("Value").props("dense").on("change", self._fill)
         self._grid = self._table()
         with ui.element("h2"):
@@ -255,7 +271,7 @@ class ConditionsPage:
         self._rig: dict[str, ui.input] = {}
         with ui.element("div").classes("fields"):
             for key, text in self._cells[RIG].items():
-                field = ui.input(label_of(Conditions, key), value=text).props("dense bottom-slots")
+                field = ui.input(self._label(key), value=text).props("dense bottom-slots")
                 self._rig[key] = field.on("change", partial(self._resize, key, field))
         ui.checkbox(
             "Keep values that look like a wrong unit", value=not is_judged(session), on_change=self._judge
@@ -266,13 +282,16 @@ class ConditionsPage:
         with self._fault.around():
             self._check()
 
+    def _label(self, key: str) -> str:
+        return self._freedom.words(label_of(Conditions, key))
+
     def _table(self) -> ui.aggrid:
         columns: list[dict[str, Any]] = [{"field": "run", "headerName": "run", "minWidth": 80, "flex": 1}]
-        for key in RUN_KEYS:
+        for key in self._keys:
             columns.append(
                 {
                     "field": key,
-                    "headerName": label_of(Conditions, key),
+                    "headerName": self._label(key),
                     "editable": True,
                     "minWidth": 64,
                     "flex": 1,
@@ -325,8 +344,8 @@ class ConditionsPage:
 
     def _pasted(self, event: events.GenericEventArguments) -> None:
         row, key = self._runs[event.args["row"]], event.args["key"]
-        if key in RUN_KEYS:
-            texts_by_run = pasted(self._cells, list(RUN_KEYS), row, key, event.args["text"])
+        if key in self._keys:
+            texts_by_run = pasted(self._cells, list(self._keys), row, key, event.args["text"])
             changed = {
                 (run, column): text
                 for run, texts in texts_by_run.items()
@@ -351,10 +370,10 @@ class ConditionsPage:
         """Save the valid cells, and mark the others: in the table, in the fields and in words."""
         cells = self._cells
         wrong = save(self._session, cells)
-        windy = any(cells[run]["wind_speed"].strip() not in ("", "0") for run in self._runs)
+        windy = any(cells[run].get("wind_speed", "").strip() not in ("", "0") for run in self._runs)
         words = MISSING | ({"spring_stiffness": _OF_JOINT} if self._driven and not windy else {})
         missing = {
-            (row, key): words[key]
+            (row, key): self._freedom.words(words[key])
             for row, texts in cells.items()
             for key, text in texts.items()
             if key in MISSING and not text.strip() and (row != RIG or windy)
@@ -364,9 +383,9 @@ class ConditionsPage:
             {
                 "run": run,
                 **cells[run],
-                "wrong": [key for key in RUN_KEYS if (run, key) in wrong],
-                "missing": [key for key in RUN_KEYS if (run, key) in missing and (run, key) not in wrong],
-                **{f"{key}_why": why.get((run, key), "") for key in RUN_KEYS},
+                "wrong": [key for key in self._keys if (run, key) in wrong],
+                "missing": [key for key in self._keys if (run, key) in missing and (run, key) not in wrong],
+                **{f"{key}_why": why.get((run, key), "") for key in self._keys},
             }
             for run in self._runs
         ]

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime
 from functools import partial
 from html import escape
-from math import degrees
 from typing import TYPE_CHECKING
 
 import tomli_w
@@ -19,7 +18,7 @@ from nicegui import ui
 from diagnosis.findings.next_run import NextRun
 from diagnosis.result import Diagnosis
 from identification.show.blocks import Paragraph, typeset
-from identification.show.numbers import plain
+from identification.show.numbers import plain, reading_shown
 from tunnel_lab.bench import work
 from tunnel_lab.bench.left_out import build_choice, left_out_of, options
 from tunnel_lab.bench.parts import (
@@ -40,6 +39,7 @@ from tunnel_sim.files.reading import read_json
 from tunnel_sim.files.writing import write_json
 from tunnel_sim.vocabulary.dimensions import beside
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.freedom import Freedom
 
 if TYPE_CHECKING:
     from diagnosis.by_hand import Closure
@@ -341,10 +341,10 @@ def build_next_run(session: Session, frame: Frame) -> None:
     assert answer is not None  # else the stage is closed
     heading("What to do next")
     with ui.element("ol"):
-        show_items(next_steps(answer))
-    show_blocks(map(Paragraph, rival_lines(answer)))
+        show_items(answer.freedom.texts(list(next_steps(answer)), answer.names))
+    show_blocks(map(Paragraph, answer.freedom.texts(list(rival_lines(answer)), answer.names)))
     if (run := run_to_make(answer)) is not None:
-        show_run(run)
+        show_run(run, answer.freedom)
     if why := unplannable(answer):
         ui.label(why).classes("soft")
     else:
@@ -364,8 +364,9 @@ class _Rivals:
         fitted = {
             kind.name: plain(kind.name)
             for kind in known_effects()
-            if kind.fitted and (blown or kind.condition == "always")
+            if kind.fitted and (blown or kind.condition == "always") and kind.possible(answer.freedom)
         }
+        self._freedom = answer.freedom
         answers = [
             [name for name in candidate.effect.split(" + ") if name in fitted]
             for candidate in answer.candidates
@@ -407,17 +408,18 @@ class _Rivals:
                 if not run.distinguishes():
                     ui.label(run.too_close())
                 else:
-                    show_run(run)
+                    show_run(run, self._freedom)
 
 
-def show_run(run: NextRun) -> None:
+def show_run(run: NextRun, freedom: Freedom) -> None:
     """A run to make: its conditions (SI units), duration and separation."""
     wind = "off" if run.wind_speed == 0.0 else f"{run.wind_speed:g} m/s"
+    unit = next(iter(freedom.shown))
     show_facts(
         [
-            (f"{run.spring_stiffness:g} N m/rad", "spring"),
-            (wind, "wind"),
-            (f"{run.release_angle:.2g} rad ({degrees(run.release_angle):.0f}°)", "release"),
+            (f"{run.spring_stiffness:g} {freedom.unit('N m/rad')}", "spring"),
+            *([(wind, "wind")] if freedom.windy else []),
+            (f"{run.release_angle:.2g} {unit} ({reading_shown(run.release_angle, 2, unit)})", "release"),
             (f"{run.duration:.3g} s", "length of the record"),
             (f"{run.separation:.0f} standard deviations", "expected difference, in the noise's"),
         ]
@@ -430,8 +432,11 @@ def show_run(run: NextRun) -> None:
             "spring_stiffness": run.spring_stiffness,
             "release_angle": run.release_angle,
         }
-        head = f"# Record {run.duration:g} s from the release; state air_density where the wind is on.\n"
-        table = head + tomli_w.dumps({"runs": [{"id": "next", "file": "runs/next.csv", **stated}]})
+        density = "; state air_density where the wind is on" if freedom.windy else ""
+        head = f"# Record {run.duration:g} s from the release{density}.\n"
+        table = head + tomli_w.dumps(
+            {"runs": [{"id": "next", "file": "runs/next.csv", **freedom.as_own(stated)}]}
+        )
         ui.download(table.encode(), "next-run.toml")
 
     with ui.element("p").classes("buttons"):

@@ -13,7 +13,15 @@ from nicegui import background_tasks, ui
 
 from identification.estimate import UNITS
 from identification.estimators import free_decay_estimators, summary_of
-from identification.printing import SYMBOLS, Document, budget_blocks, notes, quantity_text
+from identification.printing import (
+    SYMBOLS,
+    Document,
+    budget_blocks,
+    freedom_of,
+    names_in,
+    notes,
+    quantity_text,
+)
 from identification.show.blocks import Block, Paragraph, TextTable
 from identification.show.numbers import unit
 from tunnel_lab.bench import work
@@ -156,6 +164,7 @@ def side_by_side(documents: Sequence[Document]) -> list[Block]:
     """Estimates of one campaign: the coefficients, ωn and ζ of the runs, and the notes of the estimators."""
     names = tuple(str(document["estimator"]) for document in documents)
     given = [name for name in UNITS if any(document[name] for document in documents)]
+    freedom, ids = freedom_of(documents[0]), names_in(documents[0])
     rows = tuple(
         (f"{SYMBOLS[name]} {unit(UNITS[name])}", *(quantity_text(document[name]) for document in documents))
         for name in given
@@ -164,12 +173,13 @@ def side_by_side(documents: Sequence[Document]) -> list[Block]:
     for document in documents:
         for line in notes(document):
             estimators.setdefault(line, []).append(document["estimator"])
-    return [
+    blocks: list[Block] = [
         TextTable("Coefficients ± one standard deviation", ("quantity", *names), rows),
         _runs("ωn [rad/s] of the runs ± one standard deviation", "omega_n", documents, names),
         _runs("ζ [1] of the runs ± one standard deviation", "zeta", documents, names),
         *(Paragraph(line, ", ".join(given)) for line, given in estimators.items()),
     ]
+    return freedom.texts(blocks, ids)
 
 
 def _runs(title: str, key: str, documents: Sequence[Document], names: tuple[str, ...]) -> TextTable:

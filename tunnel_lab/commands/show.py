@@ -87,7 +87,7 @@ def plot(
         data = given_campaign(campaign)
         folder = output_folder(out / campaign.resolve().name)
         drawn = {f"traces-{number}": page for number, page in enumerate(figures.trace_pages(data), 1)}
-        drawn["spectrum"] = figures.spectrum_figure(spread(data))
+        drawn["spectrum"] = figures.spectrum_figure(spread(data), data.sensor.freedom)
         estimate = identify(data, "output_error", throw=False)
         if any(run.windows for run in estimate.runs):
             drawn["windows"] = figures.windows_figure(estimate)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from identification.printing import SYMBOLS
+from identification.show.drawing import in_words
 from identification.show.numbers import unit_mark
 from identification.show.quantity import INTERVAL, Quantity
 from identification.show.style import (
@@ -31,6 +32,7 @@ from identification.show.style import (
 )
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.errors import counted
+from tunnel_sim.vocabulary.freedom import ANGLE, FREEDOMS, Freedom
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
@@ -94,7 +96,7 @@ def trace_pages(campaign: Campaign) -> tuple[Figure, ...]:
                 beside.set_ylabel(f"{run.drive.kind.noun} [{unit_mark(run.drive.kind.unit)}]", color="0.4")
                 axes.set_zorder(beside.get_zorder() + 1)
                 axes.patch.set_visible(False)
-        pages.append(fig)
+        pages.append(in_words(fig, campaign.sensor.freedom, [run.id for run in campaign.runs]))
     return tuple(pages)
 
 
@@ -116,7 +118,7 @@ def wind_off_on_figure(off: Run, on: Run) -> Figure:
 
 
 @styled
-def spectrum_figure(runs: Sequence[Run]) -> Figure:
+def spectrum_figure(runs: Sequence[Run], freedom: Freedom = ANGLE) -> Figure:
     """Power spectral density of the angle of up to six runs, rad²/Hz against Hz, on logarithmic axes."""
     fig = figure(WIDTH, 3.6)
     axes = fig.add_subplot()
@@ -129,7 +131,7 @@ def spectrum_figure(runs: Sequence[Run]) -> Figure:
     axes.set_ylabel("power spectral density of β [rad²/Hz]")
     fig.legend(loc="outside upper center", ncols=2)
     grid(axes)
-    return fig
+    return in_words(fig, freedom, [run.id for run in runs])
 
 
 def spectrum(run: Run) -> tuple[Array, Array]:
@@ -245,7 +247,7 @@ def windows_figure(estimate: Estimate) -> Figure:
     if runs:
         handles, names = panels[0].get_legend_handles_labels()
         fig.legend(handles, names, loc="outside upper center", ncols=3)
-    return fig
+    return in_words(fig, FREEDOMS[estimate.motion], [run.id for run in runs])
 
 
 def deviations(quantities: Sequence[Quantity]) -> list[Quantity]:

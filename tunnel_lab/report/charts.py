@@ -21,6 +21,7 @@ from diagnosis.where.maps import Maps
 from identification.show.drawing import (
     SIGMAS,
 )
+from identification.show.numbers import motion_shown
 from identification.show.style import with_breaks
 from tunnel_sim.vocabulary.record import Array
 
@@ -75,12 +76,13 @@ def charts(maps: Maps | None) -> dict[str, list[Chart]]:
     plane = maps.phase_plane
     if plane is not None:
         cells, reach, unit, _ = plane_cells(plane)
-        edges = np.degrees(plane.edges_rad).tolist()
+        mark, per_si = motion_shown(maps.unit)
+        edges = (per_si * plane.edges_rad).tolist()
         missing = {
             "kind": "cells",
             "title": "Missing moment",
-            "x": {"label": ANGLE, "edges": edges},
-            "y": {"label": RATE, "edges": edges},
+            "x": {"label": ANGLE.format(mark), "edges": edges},
+            "y": {"label": RATE.format(mark), "edges": edges},
             "values": [_rounded(row) for row in cells],
             "unit": unit,
             "range": [-reach, reach],

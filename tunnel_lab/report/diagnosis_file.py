@@ -11,9 +11,10 @@ from tunnel_sim.files.reading import as_described, read_json
 from tunnel_sim.files.toml_input import check_version
 from tunnel_sim.vocabulary.dimensions import dimension
 from tunnel_sim.vocabulary.errors import shown
+from tunnel_sim.vocabulary.freedom import FREEDOMS
 
 REMEDY = "give a file that tunnel diagnose --json wrote"
-READING_UNITS = {"rad", "rad/s", "rad/s2"}
+READING_UNITS = {unit for one in FREEDOMS.values() for unit in one.shown}
 
 
 def read_diagnosis(path: Path) -> Diagnosis:

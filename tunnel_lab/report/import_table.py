@@ -12,9 +12,11 @@ if TYPE_CHECKING:
 
 def parts_table(imported: Imported) -> TextTable:
     """The runs of an import: samples, rate, begin and end, swing, and conditions."""
-    swing = f"swing\n[{imported.campaign.sensor.unit}]"
+    sensor = imported.campaign.sensor
+    swing = f"swing\n[{sensor.unit}]"
     used = [part.run for part in imported.parts if part.run is not None]
-    windless = all(run.drive is not None and run.wind_speed == 0.0 for run in used)  # a joint
+    joint = all(run.drive is not None and run.wind_speed == 0.0 for run in used)
+    windless = joint or not sensor.freedom.windy
     wind = () if windless else ("V\n[m/s]",)
     headings = ("samples", "rate\n[Hz]", "from\n[s]", "to\n[s]", swing, *wind, "Kr\n[N m/rad]")
     rows = []
@@ -32,4 +34,5 @@ def parts_table(imported: Imported) -> TextTable:
                 "not stated" if spring is None else f"{spring:g}",
             ]
         rows.append((part.id, *cells))
-    return TextTable("Read", ("run", *headings), tuple(rows), right=headings)
+    found = TextTable("Read", ("run", *headings), tuple(rows), right=headings)
+    return sensor.freedom.texts(found, [part.id for part in imported.parts])

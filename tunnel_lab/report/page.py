@@ -177,7 +177,7 @@ def _page(answer: Findings, drawings: Mapping[str, Drawing], shown: dict[str, li
         "style": Markup("\n".join([font, *map(_resource, ("vendor/uPlot.min.css", "style.css"))])),
         "library": Markup(_library()),
         "script": Markup(_resource("page.js")),
-        "charts": shown,
+        "charts": answer.freedom.texts(shown, answer.names),
         "paper": "",
     }
 

@@ -19,6 +19,7 @@ from tunnel_sim.effects.parameters import (
 )
 from tunnel_sim.vocabulary.dimensions import beside
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.freedom import Freedom
 
 Channel = Literal["stiffness", "damping", "forcing", "sensor", "calibration"]
 Condition = Literal["always", "wind_on"]
@@ -121,6 +122,11 @@ class Traits:
     def acts(cls, *, wind_on: bool) -> bool:
         """Whether it acts in a run with the wind on or off."""
         return wind_on or cls.condition == "always"
+
+    @classmethod
+    def possible(cls, freedom: Freedom) -> bool:
+        """Whether a body with that freedom can have it: by the air, or by the angle in the room, only some can."""
+        return (freedom.windy or cls.condition == "always") and (freedom.turns or not cls.by_angle_in_room)
 
     @property
     def severity(self) -> float:

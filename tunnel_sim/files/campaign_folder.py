@@ -39,8 +39,9 @@ from tunnel_sim.vocabulary.campaign import (
     Zero,
     needs_density,
 )
-from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_of
-from tunnel_sim.vocabulary.input_kinds import INPUT_COLUMNS, INPUTS, InputColumn
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, one_of
+from tunnel_sim.vocabulary.freedom import ANGLE, FREEDOMS, Freedom, Motion
+from tunnel_sim.vocabulary.input_kinds import INPUTS, InputColumn
 from tunnel_sim.vocabulary.inputs import INPUT_KEYS, Hold, Input, without_spring_needs_input
 
 CAMPAIGN_FILE = "campaign.toml"
@@ -58,6 +59,7 @@ class RigTable(StrictModel):
     """``[rig]``."""
 
     yaw_inertia: Positive | None = optional("a positive number in kg m2")
+    mass: Positive | None = optional("a positive number in kg, of a displacement")
     frontal_area: Positive | None = optional("a positive number in m2")
     reference_length: Positive | None = optional("a positive number in m")
     width: Positive | None = optional("a positive number in m")
@@ -67,6 +69,7 @@ class SensorTable(StrictModel):
     """``[sensor]``."""
 
     sample_rate: SampleRate | None = optional("a positive number in Hz")
+    motion: Motion | None = optional("'angle' or 'displacement'")
     resolution: NotNegative | None = optional("a number in rad, zero or more")
     noise_std: NotNegative | None = optional("a number in rad, zero or more")
     plausible: bool | None = optional("false to accept values that look like a wrong unit, or leave it out")
@@ -86,6 +89,7 @@ class RunTable(StrictModel):
     wind_speed: NotNegative = Field(description="a number in m/s, 0 for wind-off")
     air_density: Positive | None = optional("a positive number in kg/m3")
     release_angle: float | None = optional("a number in rad")
+    release_displacement: float | None = optional("a number in m, of a displacement")
     drive_hold: Hold | None = optional("'zero' or 'linear', between the samples of a driven run's input")
     drive_gain: float | None = optional("a number other than 0 in N m per unit of the input")
     servo_kv: NotNegative | None = optional(
@@ -112,8 +116,38 @@ def read_document(path: Path) -> CampaignDocument:
 
 
 def parse_document(document: dict[str, Any], path: Path) -> CampaignDocument:
-    """Validate the content of the ``campaign.toml`` at a path."""
+    """Validate the content of the ``campaign.toml`` at a path; of a displacement, under the keys of an angle."""
     check_version(document, path)
+    freedom = _freedom_of(document)
+    document = _as_angle(document, freedom, path)
+    with freedom.errors():
+        return _parsed(document, path)
+
+
+def _freedom_of(document: Mapping[str, Any]) -> Freedom:
+    """The freedom that a document states; an angle where the statement is not valid, which is refused later."""
+    sensor = document.get("sensor")
+    stated = sensor.get("motion") if isinstance(sensor, Mapping) else None
+    return FREEDOMS.get(stated, ANGLE) if isinstance(stated, str) else ANGLE
+
+
+def _as_angle(document: Mapping[str, Any], freedom: Freedom, path: Path) -> dict[str, Any]:
+    """A document under the keys of an angle; what is not a table is left to the validation."""
+    found, rig, runs = dict(document), document.get("rig"), document.get("runs")
+    if isinstance(rig, Mapping):
+        found["rig"] = freedom.as_angle(rig, f"{shown(path)}, [rig]")
+    if isinstance(runs, list):
+        still = {} if freedom.windy else {"wind_speed": 0.0}
+        found["runs"] = [
+            still | freedom.as_angle(run, run_place(path, one_line(run.get("id"))))
+            if isinstance(run, Mapping)
+            else run
+            for run in runs
+        ]
+    return found
+
+
+def _parsed(document: dict[str, Any], path: Path) -> CampaignDocument:
     parsed = validate(CampaignDocument, document, path)
     remedy = "put the runs into several campaigns"
     check_count(len(parsed.runs), limits.CAMPAIGN_RUNS, "runs", shown(path), remedy)
@@ -154,13 +188,14 @@ def campaign_document(campaign: Campaign, files: dict[str, str]) -> dict[str, An
     """The tables of ``campaign.toml`` in their order, without values that are None; ``files`` by id of the run."""
     head = {"name": campaign.name, "description": campaign.description or None}
     document: dict[str, Any] = {"schema_version": 1, "campaign": _stated(head)}
+    own = campaign.sensor.freedom.as_own
     for key in ("rig", "sensor", "repeatability"):
         values = getattr(campaign, key)
         if values is not None and _stated(vars(values)):
-            document[key] = _stated(vars(values))
+            document[key] = own(_stated(vars(values)))
     document["runs"] = [
         {"id": run.id, "file": files[run.id]}
-        | _stated({key: value for key, value in vars(run).items() if key not in _NOT_STATED})
+        | own(_stated({key: value for key, value in vars(run).items() if key not in _NOT_STATED}))
         | ({} if run.drive is None else _stated(run.drive.stated))
         for run in campaign.runs
     ]
@@ -205,6 +240,7 @@ def read_campaign(folder: Path | str, progress: Callable[[int, int], None] | Non
         raise TunnelError("no such file", where=shown(folder / CAMPAIGN_FILE), remedy=remedy)
     document = read_document(folder / CAMPAIGN_FILE)
     sensor = SensorProperties(**document.sensor.model_dump())
+    freedom = sensor.freedom
     runs: list[Run] = []
     samples = 0
     for run in document.runs:
@@ -220,7 +256,8 @@ def read_campaign(folder: Path | str, progress: Callable[[int, int], None] | Non
         if not inside:
             what = "a symbolic link leads outside the campaign's folder"
             raise TunnelError(what, where=where, remedy="copy the file into the folder")
-        held = read_table(path, where, timed=sensor.sample_rate is None, quantity=sensor.quantity or "angle")
+        timed, quantity = sensor.sample_rate is None, sensor.quantity or "angle"
+        held = read_table(path, where, timed=timed, quantity=quantity, freedom=freedom)
         time_s = held.time_s
         if time_s is None:
             if sensor.sample_rate is None:
@@ -234,10 +271,13 @@ def read_campaign(folder: Path | str, progress: Callable[[int, int], None] | Non
             _check_keys(run, held.input_column, where)
             drive = Input(held.input_column, held.input, run.drive_hold, run.drive_gain, run.servo_kv)
         elif keys := [key for key in INPUT_KEYS if getattr(run, key) is not None]:
-            remedy = f"add a column {one_of(INPUT_COLUMNS)} to the run file, or leave the key out"
+            remedy = f"add a column {one_of(tuple(freedom.inputs))} to the run file, or leave the key out"
             raise TunnelError(f"{keys[0]} without an input column", where=where, remedy=remedy)
-        record = checked_record(time_s, held.reading, held.column, sensor, run.release_angle, where, drive)
-        without_spring_needs_input(run.spring_stiffness, drive, where)
+        with freedom.errors():
+            record = checked_record(
+                time_s, held.reading, held.column, sensor, run.release_angle, where, drive
+            )
+            without_spring_needs_input(run.spring_stiffness, drive, where)
         conditions = run.spring_stiffness, run.air_density, run.release_angle
         runs.append(Run(run.id, record, run.wind_speed, *conditions, drive=drive))
         samples += record.time_s.size
@@ -246,7 +286,7 @@ def read_campaign(folder: Path | str, progress: Callable[[int, int], None] | Non
     return Campaign(
         name=document.campaign.name,
         description=document.campaign.description,
-        rig=RigProperties(**document.rig.model_dump()),
+        rig=RigProperties(**document.rig.model_dump(exclude={"mass"})),
         sensor=sensor,
         runs=tuple(runs),
         repeatability=document.repeatability.value,
@@ -314,14 +354,16 @@ def write_campaign(
     for run in () if checked else campaign.runs:
         where = run_place(folder, run.id)
         time_s, yaw = run.record.time_s, run.record.yaw_rad
-        checked_record(time_s, yaw, "yaw_rad", campaign.sensor, run.release_angle, where, run.drive)
-        without_spring_needs_input(run.spring_stiffness, run.drive, where)
+        with campaign.sensor.freedom.errors():
+            checked_record(time_s, yaw, "yaw_rad", campaign.sensor, run.release_angle, where, run.drive)
+            without_spring_needs_input(run.spring_stiffness, run.drive, where)
     truth_text = None if truth is None else json_text(truth)
     with whole_folder(folder, replace=overwrite) as partial:
         (partial / RUN_FOLDER).mkdir()
         for run in campaign.runs:
             quantity = campaign.sensor.quantity or "angle"
-            content = table_bytes(run.record, folder / files[run.id], quantity, run.drive)
+            freedom = campaign.sensor.freedom
+            content = table_bytes(run.record, folder / files[run.id], quantity, run.drive, freedom)
             (partial / files[run.id]).write_bytes(content)
         if truth_text is not None:
             (partial / TRUTH_FILE).write_bytes(truth_text.encode())

@@ -11,12 +11,10 @@ import polars as pl
 
 from tunnel_sim.files.importing.condition_names import OF_REPEATABILITY, RIG_KEYS, RUN_KEYS
 from tunnel_sim.files.kept_process import check_polars
-from tunnel_sim.files.run_files import COLUMNS
 from tunnel_sim.files.toml_input import shown
 from tunnel_sim.files.writing import write_encoded
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, library
-from tunnel_sim.vocabulary.input_kinds import INPUT_COLUMNS
 from tunnel_sim.vocabulary.inputs import INPUT_KEYS
 from tunnel_sim.vocabulary.text_cells import as_text_cell
 
@@ -31,7 +29,7 @@ def export_campaign(campaign: Campaign, path: Path, kind: str) -> Path:
 
 
 def _column(campaign: Campaign) -> str:
-    return COLUMNS[campaign.sensor.quantity or "angle"][0]
+    return next(iter(campaign.sensor.freedom.columns[campaign.sensor.quantity or "angle"]))
 
 
 def _stated(values: object, keys: tuple[str, ...]) -> dict[str, float]:
@@ -41,7 +39,7 @@ def _stated(values: object, keys: tuple[str, ...]) -> dict[str, float]:
 def _of_campaign(campaign: Campaign) -> dict[str, float]:
     """The stated sizes of the rig, and the stated scatter between runs."""
     spread = {} if campaign.repeatability is None else campaign.repeatability.stated
-    return _stated(campaign.rig, RIG_KEYS) | {
+    return campaign.sensor.freedom.as_own(_stated(campaign.rig, RIG_KEYS)) | {
         f"{OF_REPEATABILITY}{name}": value for name, value in spread.items()
     }
 
@@ -71,7 +69,7 @@ def _as_mat(campaign: Campaign, stream: BinaryIO, _where: str) -> None:
     keys = ("id", *_condition_keys(campaign), "time_s", _column(campaign), *_input_columns(campaign))
     runs = np.zeros(len(campaign.runs), dtype=[(key, object) for key in keys])
     for place, run in enumerate(campaign.runs):
-        known = {"id": run.id, **_conditions(run), **_record(campaign, run)}
+        known = {"id": run.id, **_conditions(campaign, run), **_record(campaign, run)}
         runs[place] = tuple(known.get(key, np.empty((0, 0))) for key in keys)
     rig: Mapping[str, Any] = {"name": campaign.name, **_of_campaign(campaign)}
     savemat(
@@ -84,23 +82,27 @@ def _as_mat(campaign: Campaign, stream: BinaryIO, _where: str) -> None:
 
 
 def _condition_keys(campaign: Campaign) -> tuple[str, ...]:
-    return (*RUN_KEYS, *INPUT_KEYS) if _input_columns(campaign) else RUN_KEYS
+    keys = tuple(campaign.sensor.freedom.as_own(dict.fromkeys(RUN_KEYS)))
+    return (*keys, *INPUT_KEYS) if _input_columns(campaign) else keys
 
 
 def _cells(campaign: Campaign, run: Run) -> dict[str, float | str | None]:
     """The conditions of a run, None if they are not stated, and the stated sizes and scatter."""
-    stated = _conditions(run)
+    stated = _conditions(campaign, run)
     return {key: stated.get(key) for key in _condition_keys(campaign)} | _of_campaign(campaign)
 
 
 def _record(campaign: Campaign, run: Run) -> dict[str, Any]:
-    given: dict[str, Any] = {} if run.drive is None else {run.drive.column: run.drive.values}
+    own = campaign.sensor.freedom.own_input
+    given: dict[str, Any] = {} if run.drive is None else {own(run.drive.column): run.drive.values}
     return {"time_s": run.record.time_s, _column(campaign): run.record.yaw_rad, **given}
 
 
-def _conditions(run: Run) -> dict[str, float | str]:
-    """The stated conditions of a run by key; for a driven run also its input's."""
-    stated: dict[str, float | str | None] = {key: getattr(run, key) for key in RUN_KEYS}
+def _conditions(campaign: Campaign, run: Run) -> dict[str, float | str]:
+    """The stated conditions of a run by key; for a driven run also those of its input."""
+    stated: dict[str, float | str | None] = campaign.sensor.freedom.as_own(
+        {key: getattr(run, key) for key in RUN_KEYS}
+    )
     if run.drive is not None:
         stated |= run.drive.stated
     return {key: value for key, value in stated.items() if value is not None}
@@ -109,7 +111,7 @@ def _conditions(run: Run) -> dict[str, float | str]:
 def _input_columns(campaign: Campaign) -> tuple[str, ...]:
     """The input columns of any run, in the order of the format."""
     found = {drive.column for drive in campaign.inputs}
-    return tuple(name for name in INPUT_COLUMNS if name in found)
+    return tuple(name for name, kind in campaign.sensor.freedom.inputs.items() if kind in found)
 
 
 def _as_hdf5(campaign: Campaign, stream: BinaryIO, where: str) -> None:
@@ -120,7 +122,7 @@ def _as_hdf5(campaign: Campaign, stream: BinaryIO, where: str) -> None:
         width = len(str(len(campaign.runs)))  # programs sort groups by name
         for number, run in enumerate(campaign.runs, 1):
             group = file.create_group(f"run-{number:0{width}d}")
-            group.attrs.update({"id": run.id, **_conditions(run)})
+            group.attrs.update({"id": run.id, **_conditions(campaign, run)})
             for name, values in _record(campaign, run).items():
                 group.create_dataset(name, data=values, compression="gzip", shuffle=True)
 

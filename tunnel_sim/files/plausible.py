@@ -42,8 +42,9 @@ _BEYOND = 1.0  # ranges of the other readings: a value farther away stands for a
 MINIMUM_CYCLES = 3.0
 # The count is uncertain, most with heavy damping or a drifting sensor; a run of three cycles must pass.
 CYCLE_TOLERANCE = 0.25
-# If degrees are given as radians or vice versa, swing and stated release angle differ by a factor of 57.3.
-_SLIP_RATIO = (50.0, 75.0)
+# If degrees are given as radians or vice versa, swing and stated release angle differ by a factor of 57.3; of
+# millimetres and metres by 1000. A release need not be the greatest swing: from 0.87 to 1.3 of that factor.
+_SLIP_RATIO = (50.0 * np.pi / 180.0, 75.0 * np.pi / 180.0)
 
 
 @dataclass(frozen=True)
@@ -123,17 +124,18 @@ def checked_record(
     angle, judged = sensor.derivative == 0, sensor.plausible is not False
     swing = 0.5 * (float(reading.max()) - float(reading.min()))  # the sensor's zero is unknown
     if judged and angle and release_angle and swing != 0.0:
-        ratio, (low, high) = abs(release_angle) / swing, _SLIP_RATIO
-        if column == "yaw_rad" and low <= 1.0 / ratio <= high:
+        slip = sensor.freedom.slip
+        ratio, low, high = abs(release_angle) / swing, slip * _SLIP_RATIO[0], slip * _SLIP_RATIO[1]
+        if not column.endswith(("_deg", "_mm")) and low <= 1.0 / ratio <= high:
             raise TunnelError(
-                f"yaw_rad swings by ±{swing:.4g}, about 57 times the release_angle of "
+                f"{column} swings by ±{swing:.4g}, about {slip:.0f} times the release_angle of "
                 f"{release_angle:.4g} rad: it looks like degrees",
                 where=where,
                 remedy=f"name the column yaw_deg, or convert it to radians; {KEEP}",
             )
         if low <= ratio <= high:
             raise TunnelError(
-                f"{column} swings by ±{swing:.4g} rad, about 1/57 of the release_angle of "
+                f"{column} swings by ±{swing:.4g} rad, about 1/{slip:.0f} of the release_angle of "
                 f"{release_angle:.4g} rad: one of them is in the wrong unit",
                 where=where,
                 remedy="give release_angle in rad, name the column for its unit, or leave release_angle out; "

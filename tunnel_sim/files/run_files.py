@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,19 +22,17 @@ from tunnel_sim.sandbox import Message, Work
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import Quantity
 from tunnel_sim.vocabulary.errors import TunnelError, one_line, one_of
-from tunnel_sim.vocabulary.input_kinds import INPUT_COLUMNS, WITHOUT_UNIT, InputColumn
+from tunnel_sim.vocabulary.freedom import ANGLE, FREEDOMS, Freedom
+from tunnel_sim.vocabulary.input_kinds import WITHOUT_UNIT, InputColumn
 from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.quantities import PerSample, Readings, Times
 from tunnel_sim.vocabulary.record import Array, Record
 
-COLUMNS: Mapping[str, tuple[str, ...]] = {
-    "angle": ("yaw_rad", "yaw_deg"),
-    "rate": ("yaw_rate_rad_s", "yaw_rate_deg_s"),
-    "acceleration": ("yaw_acceleration_rad_s2",),
-}
-"""The columns that may hold the reading, by the sensor's quantity; the first one is written."""
-
-USED_COLUMNS = ("time_s", *(name for names in COLUMNS.values() for name in names), *INPUT_COLUMNS)
+USED_COLUMNS = (
+    "time_s",
+    *(name for one in FREEDOMS.values() for names in one.columns.values() for name in names),
+    *dict.fromkeys(name for one in FREEDOMS.values() for name in one.inputs),
+)
 """The columns of a run file that are read; others are left alone."""
 
 RUN_FORMATS = ("parquet", "csv")
@@ -63,19 +61,20 @@ def read_table(
     *,
     timed: bool = False,
     quantity: Quantity = "angle",
+    freedom: Freedom = ANGLE,
     most: int = limits.RUN_SAMPLES,
 ) -> RunTableValues:
     """Read finite times, readings and an input from a run file; ``timed``: the times are required."""
     missing = "put the file there or correct 'file' in campaign.toml"
-    holds = (
-        f"give it a column {' or '.join(COLUMNS[quantity])}, and time_s unless [sensor] sample_rate is given"
-    )
-    given = {"timed": timed, "quantity": quantity, "most": most}
+    columns = freedom.columns[quantity]
+    holds = f"give it a column {' or '.join(columns)}, and time_s unless [sensor] sample_rate is given"
+    given = {"timed": timed, "quantity": quantity, "motion": freedom.motion, "most": most}
     found, values = _read(_table, given, path, where, missing, holds)
     arrays = dict(zip(found["values"], values, strict=True))
     column, driven = found["column"], found["input_column"]
-    reading = np.deg2rad(arrays[column]) if "_deg" in column else arrays[column]
-    return RunTableValues(arrays.get("time_s"), reading, column, driven, driven and arrays[driven])
+    reading = arrays[column] if columns[column] == 1.0 else columns[column] * arrays[column]
+    kind = driven and freedom.inputs[driven]
+    return RunTableValues(arrays.get("time_s"), reading, column, kind, driven and arrays[driven])
 
 
 def read_input(path: Path, where: str) -> tuple[Times, InputColumn, PerSample]:
@@ -120,18 +119,27 @@ def _table(given: dict[str, Any], contents: list[bytes]) -> Message:
     """The columns of times, readings and input of a run file, for `read_table`."""
     held = _held(given, contents)
     timed, where, quantity = given["timed"], given["where"], given["quantity"]
-    known, names = COLUMNS[quantity], held.names
-    driven = _input_column(names, where)
+    freedom = FREEDOMS[given["motion"]]
+    known, names = freedom.columns[quantity], held.names
+    driven = _input_column(names, where, freedom)
     found = [name for name in known if name in names]
     if len(found) > 1:
         raise TunnelError(f"both {' and '.join(found)}", where=where, remedy="leave one of them out")
     if not found:
-        other = next((kind for kind, columns in COLUMNS.items() if not set(columns).isdisjoint(names)), None)
+        other = next(
+            (
+                f"quantity = '{kind}'" if one is freedom else f"motion = '{one.motion}'"
+                for one in (freedom, *FREEDOMS.values())
+                for kind, columns in one.columns.items()
+                if not set(columns).isdisjoint(names)
+            ),
+            None,
+        )
         raise TunnelError(
             f"no column {' or '.join(known)} (columns found: {one_line(', '.join(names) or 'none', 60)})",
             where=where,
-            remedy=f"name the {quantity}'s column {' or '.join(known)}"
-            + (f", or state quantity = '{other}' under [sensor]" if other else ""),
+            remedy=f"name the {freedom.words(quantity)}'s column {' or '.join(known)}"
+            + (f", or state {other} under [sensor]" if other else ""),
         )
     column = found[0]
     stray = next((name for name in names if name != "time_s" and re.match(r"(?i)t$|time", name)), None)
@@ -157,9 +165,9 @@ def _input(given: dict[str, Any], contents: list[bytes]) -> Message:
     """The times and the input of a file, for `read_input`."""
     held = _held(given, contents)
     where = given["where"]
-    column = _input_column(held.names, where)
+    column = _input_column(held.names, where, ANGLE)
     if column is None or "time_s" not in held.names:
-        what = f"no column {'time_s' if column else ' or '.join(INPUT_COLUMNS)}"
+        what = f"no column {'time_s' if column else ' or '.join(ANGLE.inputs)}"
         raise TunnelError(what, where=where, remedy="give it time_s in s and one input column")
     values = (_numbers(held.frame.get_column(name), held.text, where) for name in ("time_s", column))
     return {"input_column": column}, _parts(values)
@@ -170,22 +178,27 @@ def _parts(values: Iterable[Array]) -> list[memoryview]:
 
 
 def table_bytes(
-    record: Record, path: Path, quantity: Quantity = "angle", drive: Input | None = None
+    record: Record,
+    path: Path,
+    quantity: Quantity = "angle",
+    drive: Input | None = None,
+    freedom: Freedom = ANGLE,
 ) -> bytes:
-    """The content of a run file, in the format of the path, with readings in radians, to the last digit."""
+    """The content of a run file, in the format of the path, with readings in SI units, to the last digit."""
     check_polars()
-    given: dict[str, Array] = {} if drive is None else {drive.column: drive.values}
-    table = pl.DataFrame({"time_s": record.time_s, COLUMNS[quantity][0]: record.yaw_rad, **given})
+    given: dict[str, Array] = {} if drive is None else {freedom.own_input(drive.column): drive.values}
+    reading = next(iter(freedom.columns[quantity]))
+    table = pl.DataFrame({"time_s": record.time_s, reading: record.yaw_rad, **given})
     # CSV values have the fewest digits that are read as the same float.
     return encoded(path, table.write_csv if path.suffix == ".csv" else table.write_parquet)
 
 
-def _input_column(names: Sequence[str], where: str) -> InputColumn | None:
+def _input_column(names: Sequence[str], where: str, freedom: Freedom) -> str | None:
     for bare, columns in WITHOUT_UNIT.items():
         if bare in names:
             remedy = f"name it {one_of(columns)}"
             raise TunnelError(f"the input column {bare} does not say its unit", where=where, remedy=remedy)
-    found = [name for name in INPUT_COLUMNS if name in names]
+    found = [name for name in freedom.inputs if name in names]
     if len(found) > 1:
         remedy = "a run has one input: keep its column and rename the others"
         raise TunnelError(f"{len(found)} input columns: {' and '.join(found)}", where=where, remedy=remedy)

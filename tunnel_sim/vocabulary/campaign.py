@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 
 from tunnel_sim.vocabulary.between_runs import Repeatability as Repeatability
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, installing
+from tunnel_sim.vocabulary.freedom import FREEDOMS, Freedom, Motion
 from tunnel_sim.vocabulary.input_kinds import InputColumn, KnownGain
 from tunnel_sim.vocabulary.inputs import Input, checked_input, refuse_several_gains, refuse_untreated
 from tunnel_sim.vocabulary.plan import SensorModel
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 Quantity = Literal["angle", "rate", "acceleration"]
-"""Quantities of a sensor: the yaw angle, or its first or second derivative."""
+"""What a sensor measures: the angle or displacement of the body, or its first or second derivative."""
 
 Zero = Literal["common", "per_run", "auto"]
 """Whether the runs have one zero, one each, or whether the records decide."""
@@ -58,6 +59,7 @@ class SensorProperties:
         resolution: step of the reading, rad (rad/s or rad/s² where it measures a rate or an acceleration).
         noise_std: standard deviation of the reading's noise, in the same unit.
         plausible: False accepts values that look like a wrong unit, and a low sample rate.
+        motion: ``displacement`` of a linear freedom, with m, N, kg in place of rad, N m, kg m²; None: an angle.
     """
 
     sample_rate: float | None = None
@@ -66,6 +68,7 @@ class SensorProperties:
     plausible: bool | None = None
     quantity: Quantity | None = None
     zero: Zero | None = None
+    motion: Motion | None = None
 
     @classmethod
     def of(cls, sensor: SensorModel) -> SensorProperties:
@@ -75,7 +78,12 @@ class SensorProperties:
     @property
     def unit(self) -> str:
         """Unit of the readings."""
-        return ("rad", "rad/s", "rad/s²")[self.derivative]
+        return self.freedom.unit(("rad", "rad/s", "rad/s²")[self.derivative])
+
+    @property
+    def freedom(self) -> Freedom:
+        """The freedom of the body, which names columns, units and words."""
+        return FREEDOMS[self.motion or "angle"]
 
     @property
     def derivative(self) -> int:
@@ -129,6 +137,8 @@ class Run:
 
     def to_xarray(self) -> Dataset:
         """The record as a dataset: ``yaw_rad`` over the coordinate ``time_s``, the conditions as attributes.
+
+        A run does not know its sensor: names are those of an angle.
 
         Raises:
             TunnelError: where xarray, of the extra ``frames``, is not installed.
@@ -221,6 +231,11 @@ class Campaign(RunGroups[Run]):
         """Whether every run with the wind on states its air density."""
         return all(run.air_density is not None for run in self.in_wind)
 
+    @property
+    def as_angle(self) -> Campaign:
+        """The campaign with the same numbers as of an angle."""
+        return replace(self, sensor=replace(self.sensor, motion=None))
+
     def driven_by(self, *columns: InputColumn) -> tuple[Run, ...]:
         """The runs whose input is in one of some columns."""
         pairs = zip(self.driven_runs, self.inputs, strict=True)
@@ -277,12 +292,14 @@ class Campaign(RunGroups[Run]):
         stated = [
             *([f"{driven} driven"] if driven else []),
             f"springs {_between(springs)} N m/rad" if springs else "no spring stated",
-            f"wind {_between([run.wind_speed for run in self.runs])} m/s" if on else "wind off",
+            *([f"wind {_between([run.wind_speed for run in self.runs])} m/s"] if on else []),
+            *(["wind off"] if self.sensor.freedom.windy and not on else []),
             f"{_between([run.record.duration for run in self.runs])} s",
         ]
+        windy = f", {on} with the wind on" if self.sensor.freedom.windy else ""
         return (
-            f"Campaign {self.name!r}: {count}, {on} with the wind on\n"
-            f"  {', '.join(stated if self.runs else [])}\n"
+            f"Campaign {self.name!r}: {count}{windy}\n"
+            f"  {self.sensor.freedom.unit(', '.join(stated if self.runs else []))}\n"
             "  .runs[0].record; identify(campaign), diagnose(campaign)"
         )
 

@@ -68,7 +68,10 @@ def dimension(unit: str) -> Dimension:
 def angle_power(unit: str) -> float:
     """The exponent with which a quantity scales with all angles and moments: 1 for either, 0 for a stiffness."""
     above, _, below = unit.partition("/")
-    return dimension(unit)[0] + _radians(above) - _radians(below.strip("()"))
+    return dimension(unit)[0] - _INERTIAS.get(unit, 0.0) + _radians(above) - _radians(below.strip("()"))
+
+
+_INERTIAS = {"kg m2": 1.0, "1/(kg m2)": -1.0}  # N m s2/rad, of which the SI does not write the radian
 
 
 def _radians(text: str) -> float:

@@ -57,7 +57,7 @@ class Record:
         low, high = float(self.yaw_rad.min()), float(self.yaw_rad.max())
         return (
             f"Record of {self.time_s.size} samples in {self.duration:.4g} s, {self.sample_rate:.4g} Hz, {kind}\n"
-            f"  readings from {low:.4g} to {high:.4g} rad (rad/s or rad/s² where the sensor measures those)\n"
+            f"  readings from {low:.4g} to {high:.4g} in the unit of the sensor\n"
             "  .time_s, .yaw_rad"
         )
 

@@ -328,13 +328,14 @@ class ReleaseOnTheOtherSide(StatementSlip):
         return (Remark(Outcome.NOTED, tuple(ids), what, remedy),)
 
 
-_DEGREES = 180.0 / np.pi
 _SUSPICIOUS = 10.0  # ratio to the amplitudes of other runs, from which the noise is compared
 
 
 @dataclass(frozen=True)
 class AngleInDegrees(StatementSlip):
     """Amplitude and noise of some runs are 57.3 times the others', or 1/57.3 of them. Refused.
+
+    Of displacements in millimetres it is 1000 times.
 
     The fewer runs are the wrong ones. Of as many large as small ones either may be wrong.
     """
@@ -353,7 +354,9 @@ class AngleInDegrees(StatementSlip):
             np.abs(noise[some] / np.median(noise[some]) - 1.0) < policy.NOISE_RATIO
             for some in (large, ~large)
         ]
-        if abs(ratio / _DEGREES - 1.0) > policy.NOISE_RATIO or not all(np.all(one) for one in alike):
+        if abs(ratio / evidence.campaign.sensor.freedom.slip - 1.0) > policy.NOISE_RATIO or not all(
+            np.all(one) for one in alike
+        ):
             return ()
         ids = [
             tuple(s.run.id for s, one in zip(evidence.swings, some, strict=True) if one)

@@ -92,9 +92,9 @@ class WrappedAngle(RecordSlip):
     def mend(self, campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
         """Unwrap records in which all large steps are whole turns, and shift them to the turn of the other runs.
 
-        Rates and accelerations do not wrap.
+        Rates, accelerations and displacements do not wrap.
         """
-        if campaign.sensor.derivative:
+        if campaign.sensor.derivative or not campaign.sensor.freedom.turns:
             return campaign, ()
         turns = {run.id: found for run in campaign.runs if (found := _turns(run.record)) is not None}
         if not turns:

@@ -18,6 +18,7 @@ from tunnel_sim.files.importing.units import UNITS, kind_of, known_unit, written
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import Quantity
 from tunnel_sim.vocabulary.errors import TunnelError, asking, counted, one_line, shown
+from tunnel_sim.vocabulary.freedom import DISPLACEMENT, column_unit, linear_unit
 from tunnel_sim.vocabulary.quantities import PerSample, Rows
 
 _COUNTERS = (2.0**8, 2.0**10, 2.0**12, 2.0**14, 2.0**16, 2.0**24, 2.0**32)
@@ -83,7 +84,9 @@ def stated_unit(text: str | None, kinds: Sequence[str], option: str) -> str | No
     """The unit of certain kinds, keys of `UNITS`, named by an option; None if the option is not given."""
     unit = known_unit(text) if text is not None else None
     if text is not None and (unit is None or kind_of(unit) not in kinds):
-        names = ", ".join(name for kind in kinds for name in UNITS[kind])
+        linear = [DISPLACEMENT.units] * ("angle" in kinds)
+        known = [*(UNITS[kind] for kind in kinds), *(units for one in linear for units in one.values())]
+        names = ", ".join(name for units in known for name in units)
         raise TunnelError(f"unknown unit '{one_line(text, 20)}'", where=option, remedy=f"use one of {names}")
     return unit
 
@@ -169,7 +172,8 @@ def refuse_without_unit(channels: Sequence[Channel], where: str) -> None:
     if len(found) > 1:
         noun = f"are {first}s by their names, and nothing states their unit"
         chosen = ", or another of them,"
-    units = f"{chosen} and --unit, one of {', '.join(UNITS[first])}; or --unit deg if it is an angle"
+    known = ", ".join((*UNITS[first], *DISPLACEMENT.units[first]))
+    units = f"{chosen} and --unit, one of {known}; or --unit deg if it is an angle"
     option = f'--angle "{one_line(found[0].name, 40)}"'
     raise asking(option, f"{listed(found)} {noun}", where, units)
 
@@ -177,11 +181,16 @@ def refuse_without_unit(channels: Sequence[Channel], where: str) -> None:
 def in_radians(
     reading: Channel, timed: Rows, choices: ImportChoices, calibration: Calibration | None, where: str
 ) -> RunColumn:
-    """Readings in rad, rad/s or rad/s²; the role is their quantity.
+    """Readings in rad, rad/s or rad/s², or of a displacement in m, m/s or m/s²; the role is their quantity.
 
     Args:
         timed: the readings of the column, NaN where there is no time.
     """
+    linear = linear_unit(choices.unit or reading.unit or column_unit(reading.name))
+    if linear is not None and choices.counts_per_turn is None and calibration is None:
+        of, unit, factor = linear
+        values = timed if factor == 1.0 else factor * timed
+        return RunColumn(reading, values, unit, of, motion=DISPLACEMENT.motion)
     kinds = ("angle", "counts", "voltage", "rate", "acceleration")
     unit = stated_unit(choices.unit, kinds, "--unit") or reading.unit
     if unit and kind_of(unit) not in kinds and choices.counts_per_turn is None and calibration is None:

@@ -41,6 +41,7 @@ from tunnel_sim.files.importing.remarks import doubt
 from tunnel_sim.files.importing.tables import NO_CHANNEL, Channel, RunColumn, Table, is_input
 from tunnel_sim.files.importing.units import claims, kind_of
 from tunnel_sim.vocabulary.errors import TunnelError, asking, attempt, did_you_mean, joined, one_line
+from tunnel_sim.vocabulary.freedom import column_unit, linear_unit
 from tunnel_sim.vocabulary.input_kinds import without_command
 
 _HEAD = 20_000  # samples of a column without a name that are inspected
@@ -324,8 +325,8 @@ def _readings(
 
 
 def _likeliest(channels: Sequence[Channel]) -> tuple[int, list[Channel]]:
-    """The columns that are most likely angles, and how they show it: from 0, most certain, to 7, not at all."""
-    levels: list[list[Channel]] = [[] for _ in range(7)]
+    """The columns that are most likely readings, and how they show it: from 0, most certain, to 8, not at all."""
+    levels: list[list[Channel]] = [[] for _ in range(8)]
     for c in channels:
         kind, by_name = kind_of(c.unit), ANGLE.search(c.name) and not named_kind(c.name)
         if not _span(c) > 0.0:
@@ -338,6 +339,8 @@ def _likeliest(channels: Sequence[Channel]) -> tuple[int, list[Channel]]:
             levels[2].append(c)
         elif kind == "counts":
             levels[3].append(c)
+        elif linear_unit(c.unit or column_unit(c.name)):
+            levels[7].append(c)
         elif c.unit == "" and not (OTHER.search(c.name) or named_kind(c.name) or resembles(c.name, "")):
             levels[_UNNAMED].append(c)
         elif kind == "voltage":

@@ -20,6 +20,10 @@ class Conditions(StrictModel):
     air_density: Positive | None = optional("a positive number in kg/m3", "air density ρ [kg/m³]")
     release_angle: float | None = optional("a number in rad", "release angle [rad]")
     yaw_inertia: Positive | None = optional("a positive number in kg m2", "nominal inertia Izz [kg m²]")
+    mass: Positive | None = optional("a positive number in kg, of a displacement", "mass [kg]")
+    release_displacement: float | None = optional(
+        "a number in m, of a displacement", "release displacement [m]"
+    )
     frontal_area: Positive | None = optional("a positive number in m2", "frontal area A [m²]")
     reference_length: Positive | None = optional("a positive number in m", "reference length l [m]")
     width: Positive | None = optional("a positive number in m", "width [m]")

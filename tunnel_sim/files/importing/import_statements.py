@@ -5,16 +5,17 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.column_numbers import Calibration, read_calibration
-from tunnel_sim.files.importing.condition_names import Hint
+from tunnel_sim.files.importing.condition_names import Conditions, Hint
 from tunnel_sim.files.importing.condition_table import ConditionTable
 from tunnel_sim.files.importing.file_names import from_name, name_hints, name_pattern
 from tunnel_sim.files.reading import stem_of
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.freedom import Freedom
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +51,18 @@ class ImportStatements:
             several,
             later,
         )
+
+    def about(self, freedom: Freedom) -> ImportStatements:
+        """The statements on readings of a freedom: under the keys of an angle, in still air where there is none.
+
+        Raises:
+            TunnelError: for a condition that the freedom does not have.
+        """
+        stated = self.choices.conditions.model_dump(exclude_none=True)
+        own = freedom.as_angle(stated, "--set")
+        if not freedom.windy:
+            own = {"wind_speed": 0.0, **own}
+        return replace(self, choices=self.choices.model_copy(update={"conditions": Conditions(**own)}))
 
     def named(self, file: Path) -> dict[str, float]:
         """Conditions in the name of a file, which must match the pattern where there is one."""

@@ -17,7 +17,7 @@ from tunnel_sim.files.importing.remarks import ImportRemark, doubt, doubt_of_mot
 from tunnel_sim.files.plausible import KEEP, checked_record, few_samples
 from tunnel_sim.files.reading import stem_of
 from tunnel_sim.files.toml_input import one_line, shown
-from tunnel_sim.vocabulary.campaign import Run, SensorProperties
+from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.errors import TunnelError, counted
 from tunnel_sim.vocabulary.input_kinds import INPUTS, InputColumn
 from tunnel_sim.vocabulary.inputs import HOLDS, Hold, Input, without_spring_needs_input
@@ -77,7 +77,7 @@ def imported_run(
     if piece.doubt:
         why = doubt(f"left out: {piece.doubt}")
         return ImportedRun(name, raw, piece, None, (why,), None, {})
-    kept, sensor = slice(piece.first, piece.last), SensorProperties(quantity=raw.quantity)
+    kept, sensor = slice(piece.first, piece.last), raw.sensor
     time, reading = raw.cleaned.time_s[kept], raw.cleaned.reading[kept]
     clock = raw.cleaned.file_time_s[kept]
     remarks = _on_the_cut(name, raw, piece, clock, reading, sensor.unit)

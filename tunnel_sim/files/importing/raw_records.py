@@ -28,7 +28,7 @@ from tunnel_sim.files.importing.source import Source
 from tunnel_sim.files.importing.tables import INPUT_FACTS, LEAST_ROWS, NO_CHANNEL, RunColumn, Table
 from tunnel_sim.files.importing.units import UNITS, kind_of, names_a_time
 from tunnel_sim.files.reading import stem_of
-from tunnel_sim.vocabulary.campaign import Quantity
+from tunnel_sim.vocabulary.campaign import Quantity, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError, attempt, counted, joined, one_line, shown
 from tunnel_sim.vocabulary.quantities import PerSample, Rows, Seconds
 from tunnel_sim.vocabulary.turning_points import HoldsTurningPoints, TurningPoints, are_turning_points
@@ -70,6 +70,14 @@ class RawRecord:
     def quantity(self) -> Quantity:
         """The quantity of the reading."""
         return cast(Quantity, self.reading.role)
+
+    @property
+    def sensor(self) -> SensorProperties:
+        """What the reading says about the sensor; an angle goes unsaid."""
+        motion, quantity = self.reading.motion, self.quantity
+        return SensorProperties(
+            quantity=None if quantity == "angle" else quantity, motion=None if motion == "angle" else motion
+        )
 
     def rows(self, first: Seconds, last: Seconds) -> NDArray[np.intp]:
         """The rows of its table that belong to a run from its first to its last sample."""

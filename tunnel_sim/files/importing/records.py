@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -37,6 +37,7 @@ from tunnel_sim.vocabulary.campaign import (
     SensorProperties,
 )
 from tunnel_sim.vocabulary.errors import TunnelError, asking, attempt, did_you_mean, together
+from tunnel_sim.vocabulary.freedom import ANGLE
 from tunnel_sim.vocabulary.record import Array
 
 _FINDERS: Mapping[Quantity, Callable[[Array, Array], list[RecordPiece]]] = {
@@ -128,13 +129,16 @@ def read_records(
             sources.append(source)
         except TunnelError as fault:
             faults.append(fault)
-    parts = _parts(raws, beside, faults)
+    freedom = raws[0].sensor.freedom if raws else ANGLE
+    beside = beside.about(freedom)
+    with freedom.errors():
+        parts = _parts(raws, beside, faults)
     if faults:
         raise _refusal(faults)
     if not raws:
         what = "every file is left out" if files else "no files"
         raise TunnelError(what, remedy="name at least one")
-    kinds = {raw.quantity for raw in raws}
+    kinds = {raw.quantity if raw.reading.motion == "angle" else raw.sensor.unit for raw in raws}
     if len(kinds) > 1:
         remedy = "import one quantity at a time, with --angle"
         raise TunnelError(f"the runs contain {' and '.join(sorted(kinds))}", remedy=remedy)
@@ -147,8 +151,8 @@ def read_records(
         raise TunnelError(what, where="--leave-out", remedy=did_you_mean(left, names))
     count = sum(part.piece.last - part.piece.first for part in parts)
     check_count(count, limits.CAMPAIGN_SAMPLES, "samples in all files", "", "import fewer files at a time")
-    sizes = _sizes(parts, choices)
-    campaign = _campaign(parts, sizes, name or one_line(stem_of(files[0])), raws[0].quantity)
+    sizes = _sizes(parts, beside.choices)
+    campaign = _campaign(parts, sizes, name or one_line(stem_of(files[0])), raws[0].sensor)
     resolved, said = _resolved(choices, sources, raws), _campaign_remarks(campaign, beside.table)
     return Imported(campaign, tuple(parts), tuple(sources), resolved, tuple(said), sizes)
 
@@ -249,7 +253,7 @@ def _sizes(parts: Sequence[ImportedRun], choices: ImportChoices) -> dict[str, fl
 
 
 def _campaign(
-    parts: Sequence[ImportedRun], sizes: Mapping[str, float], name: str, quantity: Quantity
+    parts: Sequence[ImportedRun], sizes: Mapping[str, float], name: str, sensor: SensorProperties
 ) -> Campaign:
     runs = tuple(part.run for part in parts if part.run is not None)
     if not runs:
@@ -267,10 +271,10 @@ def _campaign(
     return Campaign(
         name,
         RigProperties(**rig),
-        SensorProperties(
+        replace(
+            sensor,
             # From the readings in the files: the subtracted value need not be a whole number of steps.
             resolution=resolution([part.reading for part in used]),
-            quantity=None if quantity == "angle" else quantity,
             # The subtracted value is as uncertain as a line drawn by hand, independently in each run.
             zero="per_run" if len({part.rest for part in used}) > 1 else None,
         ),

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import one_line
+from tunnel_sim.vocabulary.freedom import Motion
 from tunnel_sim.vocabulary.input_kinds import INPUT_COLUMNS
 from tunnel_sim.vocabulary.inputs import HOLDS, INPUT_KEYS
 from tunnel_sim.vocabulary.quantities import Rows
@@ -71,6 +72,7 @@ class RunColumn:
         unit: of the channel, stated or assumed.
         role: ``time``, the quantity of a reading, or the kind of an input.
         why: remarks on its choice and its numbers.
+        motion: that a reading is of.
     """
 
     channel: Channel
@@ -78,6 +80,7 @@ class RunColumn:
     unit: str
     role: str
     why: tuple[str, ...] = ()
+    motion: Motion = "angle"
 
 
 NO_CHANNEL = Channel("", np.empty(0))

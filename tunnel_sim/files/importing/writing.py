@@ -12,6 +12,7 @@ from tunnel_sim.files.campaign_folder import IMPORT_PICTURE, IMPORT_RECIPE, writ
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.records import Imported, read_records
 from tunnel_sim.vocabulary.errors import one_line
+from tunnel_sim.vocabulary.freedom import FREEDOMS
 
 _AS_TEXT = 1_000_000  # samples: a larger campaign is written as Parquet
 _RIG = {
@@ -110,15 +111,20 @@ def campaign_text(document: Mapping[str, Any], originals: Sequence[str], driven:
     """
     tables = {key: value for key, value in document.items() if key != "runs"}
     rig = tables.pop("rig", {})
+    freedom = FREEDOMS[tables.get("sensor", {}).get("motion", "angle")]
+
+    def comments(why: Mapping[str, str], stated: Collection[str]) -> list[str]:
+        """The keys that are not stated, as comments."""
+        own = freedom.as_own({key: text for key, text in why.items() if key not in freedom.refused})
+        return [f"# {key} =   # {freedom.words(text)}" for key, text in own.items() if key not in stated]
+
     joint = all(run["id"] in driven and not run.get("wind_speed") for run in document["runs"])
-    unknown = [
-        f"# {key} =   # {why}" for key, why in (_RIG_OF_JOINT if joint else _RIG).items() if key not in rig
-    ]
+    unknown = comments(_RIG_OF_JOINT if joint else _RIG, rig)
     head = [tomli_w.dumps(tables), "\n".join(["[rig]", *unknown, tomli_w.dumps(rig)])]
-    head += [_RUNS_HEAD] if "repeatability" in tables else [_REPEATABILITY, _RUNS_HEAD]
+    head += [_RUNS_HEAD] if "repeatability" in tables else [freedom.words(_REPEATABILITY), _RUNS_HEAD]
     blocks = []
     for run in document["runs"]:
         wanted = _RUN_OF_JOINT if joint else _RUN | (_OF_INPUT if run["id"] in driven else {})
-        unknown = [f"# {key} =   # {why}" for key, why in wanted.items() if key not in run]
+        unknown = comments(wanted, run)
         blocks.append("\n".join(["[[runs]]", tomli_w.dumps(run).strip(), *unknown, ""]))
     return "\n".join([*originals, *head, *blocks])

@@ -29,6 +29,7 @@ from diagnosis.search.weigh import FittedSet
 from diagnosis.settings import Settings
 from tests.support.gap_campaigns import NOISE, added, answer, nominal, studied
 from tunnel_sim.effects import effect_class
+from tunnel_sim.vocabulary.freedom import ANGLE
 
 CAUSE, IDLE, HUM = "quadratic_damping", "cubic_stiffness", "mains_hum"
 NO_BASE = Base(NOISE**2, 0.0, 0.0)
@@ -133,7 +134,7 @@ def test_the_probability_of_an_effect_is_that_of_the_answers_that_name_it():
         Candidate("sensor_drift", 0.125, 0.0, 1.0),
         Candidate("unknown", 0.175, 0.0, 0.0),
     )
-    found = inclusion(weighed, (HUM,), Settings().gap)
+    found = inclusion(weighed, (HUM,), Settings().gap, ANGLE)
     assert found["free_play"] == pytest.approx(0.7)
     assert found["sensor_drift"] == pytest.approx(0.625)
     assert found[HUM] == 1.0 - 1e-3

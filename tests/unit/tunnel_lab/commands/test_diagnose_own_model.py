@@ -115,7 +115,7 @@ def test_the_free_parameters_are_written_where_there_is_no_gap(
     assert inertias[1] == pytest.approx(inertias[0], rel=1e-6)
 
 
-def test_a_slide_says_so(tunnel: Tunnel, spring: Path, tmp_path: Path) -> None:
+def test_a_slide_is_diagnosed_as_a_displacement(tunnel: Tunnel, spring: Path, tmp_path: Path) -> None:
     model = tmp_path / "rig.xml"
     model.write_text(model.read_text().replace('name="yaw"', 'name="yaw" type="slide"'))
     given = ("--model", model, "--joint", "yaw", "--json", "-")
@@ -123,7 +123,9 @@ def test_a_slide_says_so(tunnel: Tunnel, spring: Path, tmp_path: Path) -> None:
     assert status == 0
     document = json.loads(shown)
     assert document["causes"] == []
-    assert "The joint slides: read m for rad, N for N m and kg for kg m2 throughout." in document["cautions"]
+    assert document["motion"] == "displacement"
+    assert document["coefficients"]["after"]["yaw_inertia"]["unit"] == "kg"
+    assert not any("rad" in w["unit"] or "N m" in w["unit"] for w in document["model"]["written"])
     (mass,) = next(w["after"] for w in document["model"]["written"] if w["name"].endswith("mass"))
     assert mass == pytest.approx(document["coefficients"]["after"]["yaw_inertia"]["value"])
 

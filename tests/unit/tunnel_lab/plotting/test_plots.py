@@ -44,7 +44,8 @@ def window(amplitude: float, zeta: float, std: float, omega_n: float = 10.0) -> 
 
 
 def estimate(*runs: tuple[SimpleNamespace, ...]) -> SimpleNamespace:
-    return SimpleNamespace(runs=[SimpleNamespace(id=f"r{i}", windows=run) for i, run in enumerate(runs)])
+    shown = [SimpleNamespace(id=f"r{i}", windows=run) for i, run in enumerate(runs)]
+    return SimpleNamespace(runs=shown, motion="angle")
 
 
 def test_a_noisy_window_moves_only_itself_from_zero() -> None:

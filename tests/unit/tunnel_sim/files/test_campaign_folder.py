@@ -25,6 +25,7 @@ from tunnel_sim.vocabulary.campaign import (
     SensorProperties,
 )
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.freedom import Freedom
 from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.record import Record
 
@@ -325,10 +326,10 @@ def test_a_disk_that_fails_leaves_the_old_campaign_and_no_litter(
 ) -> None:
     folder = write_campaign(campaign(), tmp_path / "c")
 
-    def full(record: Record, path: Path, quantity: Quantity, drive: Input | None) -> bytes:
+    def full(record: Record, path: Path, quantity: Quantity, drive: Input | None, freedom: Freedom) -> bytes:
         if path.stem == "on":
             raise OSError(28, "No space left on device")
-        return table_bytes(record, path, quantity, drive)
+        return table_bytes(record, path, quantity, drive, freedom)
 
     monkeypatch.setattr(campaign_folder, "table_bytes", full)
     for target in (folder, tmp_path / "other"):
@@ -341,10 +342,12 @@ def test_a_disk_that_fails_leaves_the_old_campaign_and_no_litter(
 def test_a_campaign_written_meanwhile_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     other = replace(campaign(), name="the other")
 
-    def overtaken(record: Record, path: Path, quantity: Quantity, drive: Input | None) -> bytes:
+    def overtaken(
+        record: Record, path: Path, quantity: Quantity, drive: Input | None, freedom: Freedom
+    ) -> bytes:
         monkeypatch.setattr(campaign_folder, "table_bytes", table_bytes)
         write_campaign(other, tmp_path / "c")
-        return table_bytes(record, path, quantity, drive)
+        return table_bytes(record, path, quantity, drive, freedom)
 
     monkeypatch.setattr(campaign_folder, "table_bytes", overtaken)
     with pytest.raises(TunnelError, match="c: the folder exists"):
