@@ -149,11 +149,11 @@ def cause_sizes(study: Study) -> tuple[CauseSize, ...]:
     return tuple(sizes)
 
 
-def damping_ratio(fit: Fit) -> float | None:
-    """The damping ratio of the fitted motion as a whole over three cycles from half of the largest swing.
+def decay_of_swing(fit: Fit) -> tuple[float, float] | None:
+    """The decay of the fitted motion as a whole over three cycles from half of the largest swing.
 
     Returns:
-        Of the first run; None where its motion there is not a decay.
+        Angular frequency (rad/s) and damping ratio, of the first run; None where its motion there is not a decay.
     """
     data = fit.problem.data
     release = fit.point.per_run.copy()
@@ -163,7 +163,7 @@ def damping_ratio(fit: Fit) -> float | None:
     decay = _decay(
         run.interval, fit.problem.predict([Point(fit.point.common, release)])[0][0][:count], frequency
     )
-    return None if decay is None or decay[1] <= 0.0 else decay[1]
+    return None if decay is None or decay[1] <= 0.0 else decay[:2]
 
 
 def _decay(interval: float, curve: Array, frequency: float) -> tuple[float, float, float] | None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from scipy.special import ndtr, ndtri
 
-from diagnosis.findings.cause_sizes import damping_ratio
+from diagnosis.findings.cause_sizes import decay_of_swing
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import linear_coefficients
 from diagnosis.search.study import Study
@@ -106,13 +106,17 @@ def _greatest(study: Study, name: str) -> float | None:
     fit, data = study.chosen, study.chosen.problem.data
     if data.driven or data.wind_on or study.chosen is study.nominal:
         return None
-    ratio = damping_ratio(fit)
-    if ratio is None:
+    motion = decay_of_swing(fit)
+    if motion is None:
         return None
+    frequency, ratio = motion
     inertia, _, stiffness = linear_coefficients(fit, 0)
     critical = data.model.critical_damping(inertia, stiffness)
     if critical is None:
         return None
+    if any(kind.channel == "stiffness" for kind in fit.problem.effects):
+        # the rate is ratio times frequency, and a stiffening spring raises the frequency of the swing
+        ratio *= max(2.0 * inertia * frequency / critical, 1.0)
     # the whole rate is known as well as the damping of the nominal model, in noise as large as the misfit
     reach = 2.0 * _std(study.nominal) * math.sqrt(1.0 + max(fit.excess, 0.0)) / critical
     whole = ratio + reach

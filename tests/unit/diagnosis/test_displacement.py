@@ -86,6 +86,21 @@ def test_the_cause_is_found_with_its_size(case: tuple[Diagnosis, Campaign, str |
     assert "m" in size.unit or size.unit == "N"
 
 
+def test_mass_and_damping_are_in_their_intervals(
+    case: tuple[Diagnosis, Campaign, str | None, float],
+) -> None:
+    """Beside a spring that stiffens, too: its swing is faster than its natural frequency."""
+    answer, campaign, _, _ = case
+    mass, k = campaign.rig.yaw_inertia, campaign.runs[0].spring_stiffness
+    assert mass is not None
+    assert k is not None
+    truths = {"yaw_inertia": mass, "mechanical_damping": 2.0 * 0.005 * float(np.sqrt(k * mass))}
+    assert answer.coefficients.after.keys() == truths.keys()
+    for name, truth in truths.items():
+        found = answer.coefficients.after[name]
+        assert abs(found.value - truth) < 4.0 * found.known_std, name
+
+
 def test_no_text_is_about_an_angle(case: tuple[Diagnosis, Campaign, str | None, float]) -> None:
     """In print, in the document, on the page and in its figures."""
     answer, campaign, _, _ = case

@@ -8,7 +8,7 @@ from scipy.stats import truncnorm
 
 from diagnosis.answer.held_out import one_more
 from diagnosis.findings.averaged_coefficients import coefficients, possible_answers
-from diagnosis.findings.cause_sizes import damping_ratio
+from diagnosis.findings.cause_sizes import decay_of_swing
 from diagnosis.findings.passive import truncated, within_bounds
 from diagnosis.findings.trade_off import least_separated
 from diagnosis.likelihood.least_squares import fit_at
@@ -53,7 +53,7 @@ def study():
 
 
 def test_the_deviation_of_the_damping_is_within_the_whole_rate(study):
-    whole = damping_ratio(study.chosen)
+    _, whole = decay_of_swing(study.chosen)
     nominal = study.nominal.problem.data.model
     assert whole == pytest.approx(
         nominal.coefficient(study.nominal.problem.names, study.nominal.point.common, "zeta"), rel=0.1
@@ -70,7 +70,7 @@ def test_the_deviation_of_the_damping_is_within_the_whole_rate(study):
 
 
 def test_what_the_bounds_allow_is_unchanged(study):
-    whole = damping_ratio(study.chosen)
+    _, whole = decay_of_swing(study.chosen)
     for given in (
         {"zeta": Quantity(0.5 * whole, 0.05 * whole, "1")},
         {"zeta": Quantity(0.0, None, "1", bound="lower")},
