@@ -70,15 +70,16 @@ def diagnose(
     if joint is not None:
         campaign, own = with_law(campaign, joint.law)
     freedom, names = campaign.sensor.freedom, (campaign.name, *(run.id for run in campaign.runs))
-    with freedom.errors():
+    kinds = [kind for kind in (known_effects() if kinds is None else kinds) if kind.possible(freedom)]
+    with freedom.errors(), answering_with(kinds):
         found = _diagnosed(campaign, leave_out, kinds, progress, (joint, own), settings, rivals)
-    return freedom.document(found, names).in_words()
+        return freedom.document(found, names).in_words()
 
 
 def _diagnosed(
     campaign: Campaign,
     leave_out: Collection[str],
-    kinds: Sequence[type[Effect]] | None,
+    kinds: Sequence[type[Effect]],
     progress: Progress | None,
     models: tuple[JointModel | None, NominalModel | None],
     settings: Settings,
@@ -92,26 +93,23 @@ def _diagnosed(
     joint, own = models
     campaign, short = without_short(campaign)
     refuse_undiagnosable(campaign, own)
-    kinds = known_effects() if kinds is None else kinds
-    kinds = [kind for kind in kinds if kind.possible(campaign.sensor.freedom)]
     say = progress or (lambda _: None)
-    with answering_with(kinds):
-        judged = joint is not None or own is None
-        chosen = choose(campaign, kinds, own, judged=judged)
-        study = _studied(chosen, progress, settings, rivals)
-        asked = Question(joint, short, tuple(leave_out), say)
-        say("explained share")
-        found, without = Confirmed.of(study), None
-        if found.repeats is not None and found.repeats.outlier:
-            say(f"without run {found.repeats.outlier}")
-            others = _without_outlier(study, found.repeats, chosen, settings, rivals)
-            if others is not None and _explained_without(others, study):
-                found = Confirmed.of(others)
-            elif others is not None:
-                without = AnswerWithout(
-                    others.causes, 1.0 if others.answer is None else others.answer.probability
-                )
-        return composed(found, chosen, asked, without)
+    judged = joint is not None or own is None
+    chosen = choose(campaign, kinds, own, judged=judged)
+    study = _studied(chosen, progress, settings, rivals)
+    asked = Question(joint, short, tuple(leave_out), say)
+    say("explained share")
+    found, without = Confirmed.of(study), None
+    if found.repeats is not None and found.repeats.outlier:
+        say(f"without run {found.repeats.outlier}")
+        others = _without_outlier(study, found.repeats, chosen, settings, rivals)
+        if others is not None and _explained_without(others, study):
+            found = Confirmed.of(others)
+        elif others is not None:
+            without = AnswerWithout(
+                others.causes, 1.0 if others.answer is None else others.answer.probability
+            )
+    return composed(found, chosen, asked, without)
 
 
 def _without_outlier(
