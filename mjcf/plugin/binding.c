@@ -118,6 +118,16 @@ typedef struct {
   mjtNum other;    // of gravity, and of MuJoCo's passive forces beyond the linear spring and damper
 } vwt_engine;
 
+// Whether MuJoCo's bias acts on the joint: a single hinge has no Coriolis moment, and gravity has none about an axis
+// along it.
+static int has_bias(const mjModel* m, const mjData* d, const vwt_ids* self) {
+  const int joint = m->dof_jntid[self->dof];
+  const mjtNum* axis = d->xaxis + 3 * joint;
+  const mjtNum* gravity = m->opt.gravity;
+  return m->nv > 1 || m->jnt_type[joint] != mjJNT_HINGE || axis[1] * gravity[2] != axis[2] * gravity[1] ||
+         axis[2] * gravity[0] != axis[0] * gravity[2] || axis[0] * gravity[1] != axis[1] * gravity[0];
+}
+
 // Those on which friction depends. MuJoCo computes gravity's moment and those of the actuators after the passive forces:
 // they are computed here too, since each stage of a step has its own.
 static vwt_engine engine_moments(const mjModel* m, mjData* d, const vwt_ids* self, const vwt_parameters* p,
@@ -131,12 +141,15 @@ static vwt_engine engine_moments(const mjModel* m, mjData* d, const vwt_ids* sel
     mj_fwdActuation(m, d);
     found.applied += d->qfrc_actuator[dof];
   }
-  mj_markStack(d);
-  mjtNum* bias = mj_stackAllocNum(d, m->nv);
-  mj_rne(m, d, 0, bias);
   found.other = d->qfrc_spring[dof] + p->spring_stiffness * now->angle + d->qfrc_damper[dof] +
-                p->mechanical_damping * now->rate + d->qfrc_gravcomp[dof] + d->qfrc_fluid[dof] - bias[dof];
-  mj_freeStack(d);
+                p->mechanical_damping * now->rate + d->qfrc_gravcomp[dof] + d->qfrc_fluid[dof];
+  if (has_bias(m, d, self)) {
+    mj_markStack(d);
+    mjtNum* bias = mj_stackAllocNum(d, m->nv);
+    mj_rne(m, d, 0, bias);
+    found.other -= bias[dof];
+    mj_freeStack(d);
+  }
   return found;
 }
 
