@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
+from scipy.special import chdtrc
 
 from diagnosis.answer.held_out import (
     ON_RUNS,
@@ -59,7 +60,7 @@ class Closing:
 
 def closing(study: Study) -> Closing:
     """The gap before and after by MuJoCo, and as the causes are added."""
-    study = _of_repeating_runs(study)
+    study = closed_study(study)
     base, chosen = excess_base(study), study.chosen
     nominal_out = predict_held_out(study.nominal)
     chosen_out = predict_held_out(chosen)
@@ -73,15 +74,21 @@ def closing(study: Study) -> Closing:
     return Closing(gap, steps, shown.confirmation, seconds, shown.shifts)
 
 
-def _of_repeating_runs(study: Study) -> Study:
-    """The study with the gap of runs that repeat exactly: stated differences between runs may absorb a cause.
+def closed_study(study: Study) -> Study:
+    """The study with the gap of runs that repeat exactly, where stated differences between them absorb a cause.
 
-    Deviations of many widths leave no residual of a wrong spring, although the test of the gap counts them.
+    Deviations of many widths leave no residual of a wrong spring, although the test of the gap counts them. Where
+    the deviations are as stated they are no gap, and a cause may not be credited with them.
     """
-    if not study.named or not study.nominal.problem.scatter:
+    nominal = study.nominal
+    if not study.named or not nominal.problem.scatter:
         return study
-    nominal = try_fit(*without_deviations(study.nominal))
-    return study if nominal is None else replace(study, prepared=replace(study.prepared, nominal=nominal))
+    places = nominal.problem.parameters.places(nominal.problem.scatter)
+    away = nominal.point.per_run[:, places] / nominal.widths
+    if chdtrc(away.size, float(np.sum(away**2))) >= study.settings.scatter.scatter_rate:
+        return study
+    repeats = try_fit(*without_deviations(nominal))
+    return study if repeats is None else replace(study, prepared=replace(study.prepared, nominal=repeats))
 
 
 def confirmed(study: Study) -> tuple[Study, Closing]:

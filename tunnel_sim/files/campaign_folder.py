@@ -118,17 +118,30 @@ def read_document(path: Path) -> CampaignDocument:
 def parse_document(document: dict[str, Any], path: Path) -> CampaignDocument:
     """Validate the content of the ``campaign.toml`` at a path; of a displacement, under the keys of an angle."""
     check_version(document, path)
-    freedom = _freedom_of(document)
+    freedom = _freedom_of(document, path)
     document = _as_angle(document, freedom, path)
     with freedom.errors():
         return _parsed(document, path)
 
 
-def _freedom_of(document: Mapping[str, Any]) -> Freedom:
-    """The freedom that a document states; an angle where the statement is not valid, which is refused later."""
+def _freedom_of(document: Mapping[str, Any], path: Path) -> Freedom:
+    """The freedom that a document states; an angle where the statement is no text, which is refused later.
+
+    Raises:
+        TunnelError: for another text than the name of a freedom: every key depends on it.
+    """
     sensor = document.get("sensor")
     stated = sensor.get("motion") if isinstance(sensor, Mapping) else None
-    return FREEDOMS.get(stated, ANGLE) if isinstance(stated, str) else ANGLE
+    if not isinstance(stated, str):
+        return ANGLE
+    if stated not in FREEDOMS:
+        known = one_of([f"'{name}'" for name in FREEDOMS])
+        raise TunnelError(
+            f"motion = '{one_line(stated)}' is no motion",
+            where=f"{shown(path)}, [sensor]",
+            remedy=f"give {known}",
+        )
+    return FREEDOMS[stated]
 
 
 def _as_angle(document: Mapping[str, Any], freedom: Freedom, path: Path) -> dict[str, Any]:

@@ -162,7 +162,9 @@ _REFINED = 1.3  # factor on τ about the best of these
 _SWEEPS = 2  # of the poles' linear corrections
 _SHARE_LEFT = 0.05  # of the centre's decay that may remain as a zero
 _LEAD = 0.2  # relative tolerance of the lead about arctan(1/ωτ)
-_LASTING = 0.5  # cycles; least τ in a single run, since the hold of a hand is over within the first cycle
+_LASTING = (
+    0.5  # cycles; least τ in a single run. The hold of a hand is over within a cycle (three drawn: 0.19)
+)
 
 
 @dataclass(frozen=True, eq=False)

@@ -107,6 +107,16 @@ def test_the_keys_of_a_displacement_are_refused_of_an_angle(tmp_path: Path) -> N
         read_campaign(path)
 
 
+def test_another_motion_is_refused_before_the_keys_that_depend_on_it(tmp_path: Path) -> None:
+    path = folder(tmp_path / "c")
+    text = (path / "campaign.toml").read_text().replace('"displacement"', '"dispalcement"')
+    (path / "campaign.toml").write_text(text)
+    with pytest.raises(
+        TunnelError, match="motion = 'dispalcement' is no motion; give 'angle' or 'displacement'"
+    ):
+        read_campaign(path)
+
+
 def test_a_campaign_says_so_in_its_own_units(tmp_path: Path) -> None:
     said = repr(read_campaign(folder(tmp_path / "c")))
     assert "N/m" in said

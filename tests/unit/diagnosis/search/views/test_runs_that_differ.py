@@ -12,9 +12,12 @@ import numpy as np
 import pytest
 
 from diagnosis import diagnose
+from diagnosis.findings.closing import closed_study
 from diagnosis.likelihood.starting_points import loses_phase
 from diagnosis.result import Diagnosis
+from diagnosis.search.investigate import investigate
 from tests.support.gap_campaigns import CN_BETA, CN_R, campaign, nominal
+from tunnel_sim.effects import Effect, effect_class, effect_from
 from tunnel_sim.vocabulary.between_runs import Repeatability
 from tunnel_sim.vocabulary.campaign import Campaign
 
@@ -23,15 +26,15 @@ SOFT, BY = 44.84, 0.03
 WIND, SPRING = 0.003, 0.0005
 
 
-def differing(seed: int, *, stated: bool = False) -> Campaign:
-    """Nine runs, their differences stated or not."""
+def differing(seed: int, *effects: Effect, by: float = BY, stated: bool = False) -> Campaign:
+    """Nine runs, their differences stated or not, one spring softer by a share than stated."""
     rng = np.random.default_rng(seed)
     actual = []
     for stiffness, speed in STATED:
         spring, wind = rng.standard_normal(2)
-        soft = 1.0 - BY * (stiffness == SOFT)
+        soft = 1.0 - by * (stiffness == SOFT)
         actual.append((stiffness * soft * (1.0 + SPRING * spring), speed * (1.0 + WIND * wind)))
-    data = campaign(conditions=actual, seed=seed)
+    data = campaign(*effects, conditions=actual, seed=seed)
     runs = tuple(
         replace(run, spring_stiffness=k, wind_speed=v) for run, (k, v) in zip(data.runs, STATED, strict=True)
     )
@@ -69,3 +72,17 @@ def test_stated_differences_do_not_absorb_the_gap(answer: Diagnosis) -> None:
     assert stated.gap.closed > 0.99
     assert stated.gap.excess_before == pytest.approx(answer.gap.excess_before, rel=0.5)
     assert_right(stated)
+
+
+@pytest.mark.parametrize(("by", "absorbed"), [(0.0, False), (BY, True)])
+def test_the_gap_is_of_runs_that_repeat_only_where_stated_differences_absorb_it(
+    by: float, absorbed: bool
+) -> None:
+    """Differences as stated are no gap: a small cause beside them is not credited with them."""
+    friction = effect_from("coulomb_friction", {"friction_moment": 0.0005})
+    names = ("coulomb_friction", "spring_miscalibration", "wind_speed_scatter", "stiffness_scatter")
+    kinds = [effect_class(name) for name in names]
+    study = investigate(differing(7, friction, by=by, stated=True), kinds)
+    assert "coulomb_friction" in study.causes
+    assert study.nominal.problem.scatter
+    assert (closed_study(study) is not study) == absorbed
