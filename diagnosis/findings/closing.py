@@ -38,6 +38,10 @@ from tunnel_sim.vocabulary.record import Array
 INTEGRATOR_TOLERANCE: Final = 0.1
 """Maximum difference between MuJoCo and the integrator of the fits, in std of a block mean. Judgement."""
 
+ABSORBED_RATE: Final = 0.001
+"""Probability of deviations as large, by the stated widths, below which they absorb a cause. Convention. One
+campaign in 1000 as stated; a cause that the deviations would absorb is many widths off."""
+
 
 @dataclass(frozen=True)
 class Closing:
@@ -85,7 +89,7 @@ def closed_study(study: Study) -> Study:
         return study
     places = nominal.problem.parameters.places(nominal.problem.scatter)
     away = nominal.point.per_run[:, places] / nominal.widths
-    if chdtrc(away.size, float(np.sum(away**2))) >= study.settings.scatter.scatter_rate:
+    if chdtrc(away.size, float(np.sum(away**2))) >= ABSORBED_RATE:
         return study
     repeats = try_fit(*without_deviations(nominal))
     return study if repeats is None else replace(study, prepared=replace(study.prepared, nominal=repeats))
