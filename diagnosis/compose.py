@@ -165,7 +165,8 @@ def composed(
     remarks = (*left_out_as_asked(asked.left_out), *asked.remarks, *chosen.remarks)
     withheld = any(remark.withholds for remark in remarks)
     rivals = _rivals(study)
-    beside = [answer.hypothesis.fit for answer in rivals if answer.hypothesis is not None]
+    steady = (answer.hypothesis for answer in rivals if answer.moment is None)
+    beside = [one.fit for one in steady if one is not None]
     next_run = NextRun.between(fitted, beside[0]) if beside and fitted is not study.nominal else None
     further = None
     if not (withheld or cycling):

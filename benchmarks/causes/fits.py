@@ -100,7 +100,8 @@ def grown(folder: Path) -> Grown:
         TunnelError: when the records are refused.
     """
     study = investigate(_campaign(folder), KINDS)
-    sets = [answer.stated for answer in study.answers if answer.stated is not None]
+    stated = [answer.stated for answer in study.answers if answer.stated is not None]
+    sets = [one for one in stated if one.moment is None]
     settled = not sets or study.answers[0].probability == 1.0
     data = _most_common([h.fit.problem.data for h in sets]) or study.nominal.problem.data
     nominal = study.nominal if data is study.nominal.problem.data else fit_nominal(data)
@@ -110,9 +111,9 @@ def grown(folder: Path) -> Grown:
         if h.fit.problem.data is data and (h.names not in best or one.chi2 < best[h.names].chi2):
             best[h.names] = one
     random = tuple(
-        (tuple(sorted(a.effects)), () if a.beside is None else a.beside.names, a.process.drop)
-        for answer in study.answers
-        if (a := answer.random) is not None
+        (one.names, tuple(sorted(one.effects)), one.moment.process.drop)
+        for one in stated
+        if one.moment is not None
     )
     return Grown(
         _fitted((), nominal),

@@ -17,9 +17,8 @@ from diagnosis.likelihood.residuals import resonance
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.data import FOLDS, folds
 from diagnosis.model.parameters import Point
-from diagnosis.search.hypothesis import restricted
+from diagnosis.search.hypothesis import RandomMoment, restricted
 from diagnosis.search.prepared import COARSE_STEP, HUM
-from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.scatter import with_scatter, without_deviations
 from diagnosis.search.study import Study
 from tunnel_sim.effects import Effect
@@ -200,7 +199,7 @@ def share_ahead(study: Study, whole: Collection[str]) -> float | None:
     runs = nominal.problem.data.runs
     driven = {run.id for run in nominal.problem.data.driven_runs}
     ahead = [run.id in driven.difference(whole) for run in runs]
-    if not study.named or study.random is not None or chosen is nominal or not any(ahead):
+    if not study.named or study.moment is not None or chosen is nominal or not any(ahead):
         return None
     seen = [
         np.arange(run.reading.size) < (run.reading.size // 2 if later else run.reading.size)
@@ -280,7 +279,7 @@ class Subsets:
         if key not in self._fits:
             fewer = min((known for known in self._fits if known < key), key=lambda k: self._fits[k].total)
             known, answer = self._fits[fewer], self._study.of(key)
-            own = None if answer is None else answer.hypothesis
+            own = None if answer is None or answer.moment is not None else answer.hypothesis
             if own is None:
                 start = restricted(self._study.chosen, key)
                 found = try_fit(
@@ -324,18 +323,18 @@ def waterfall(study: Study, base: Base) -> Waterfall:
         names |= {best}
         left.remove(best)
         steps.append(Step(best, models.excess(names)))
-    random = study.random
-    if random is None:
+    moment = study.moment
+    if moment is None:
         without = {name: models.excess(models.causes - {name}) for name in sorted(models.causes)}
         if len(steps) > 1 and study.scattering:
             without[" + ".join(study.scattering)] = models.repeating()
     else:
-        last = models.random_excess(random)
+        last = models.random_excess(moment)
         without = {name: last + size for name, size in models.read_off.items()}
-        acting = [kind.name for kind in random.kinds]  # a cause may act steadily too, and be among the steps
-        moment = " + ".join([name for name in acting if name not in names] or acting)
-        without[moment] = steps[-1].excess
-        steps.append(Step(moment, last))
+        acting = [kind.name for kind in moment.kinds]  # a cause may act steadily too, and be among the steps
+        words = " + ".join([name for name in acting if name not in names] or acting)
+        without[words] = steps[-1].excess
+        steps.append(Step(words, last))
     return Waterfall(tuple(steps), without, models.words)
 
 
@@ -399,13 +398,13 @@ class _Models:
             self._excess[fitted] = self._in_samples(self._predicted(fitted))
         return self._excess[fitted]
 
-    def random_excess(self, random: RandomAnswer) -> float:
+    def random_excess(self, moment: RandomMoment) -> float:
         """Residual gap of all causes and a random moment: the moment's innovations where it acts."""
         runs = self._study.nominal.problem.data.runs
         still = self._predicted(self._study.chosen)
-        acts = random.process.runs
+        acts = moment.process.runs
         by_run = {
-            run.id: random.process.excess if run.id in acts else float(np.mean(still[run.id] ** 2)) - 1.0
+            run.id: moment.process.excess if run.id in acts else float(np.mean(still[run.id] ** 2)) - 1.0
             for run in runs
         }
         return self._weighted(by_run) + self._left(self.causes)

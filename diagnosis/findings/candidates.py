@@ -211,9 +211,8 @@ def _parameters(
     if prepared.coarse:
         step = f"{COARSE_STEP.name}.{COARSE_STEP.parameters()[0].name}"
         estimates[step] = Quantity(prepared.step, None, "rad")
-    random = None if answer is None else answer.random
-    stated = None if answer is None else answer.stated
-    hypothesis = stated if random is None else random.beside
+    moment = None if answer is None else answer.moment
+    hypothesis = None if answer is None else answer.stated
     if hypothesis is not None:
         fit, problem = hypothesis.fit, hypothesis.fit.problem
         infos = {f"{kind.name}.{info.name}": info for kind in problem.effects for info in kind.parameters()}
@@ -230,16 +229,16 @@ def _parameters(
                 estimates[f"{one.name}.{spread.name}"] = Quantity(one.width, None, spread.unit)
         for name, value in problem.fixed:
             estimates[name] = Quantity(value, 0.0, infos[name].unit)
-    if random is not None:
-        seconds = random.process.interval * sum(i.size for i in random.process.innovations)
+    if moment is not None:
+        seconds = moment.process.interval * sum(i.size for i in moment.process.innovations)
         data = study.nominal.problem.data
-        for kind in random.kinds:
-            parts = [one for one in random.process.spectrum if one.is_of(kind)]
+        for kind in moment.kinds:
+            parts = [one for one in moment.process.spectrum if one.is_of(kind)]
             part = max(parts, key=lambda one: one.intensity)
             intensity = float(np.sqrt(sum(one.intensity**2 for one in parts)))
             severity, place = (f"{kind.name}.{info.name}" for info in kind.parameters())
             # their spread follows from the number of correlation times in the runs
-            independent = max(seconds * min(4.0 * part.bandwidth, 1.0 / random.process.interval), 2.0)
+            independent = max(seconds * min(4.0 * part.bandwidth, 1.0 / moment.process.interval), 2.0)
             relative = float(np.sqrt(0.5 / independent))
             if part.strouhal_number > 0.0:
                 size = float(np.sqrt(2.0)) * intensity

@@ -110,7 +110,7 @@ def _without_needless(study: Study, steps: Waterfall) -> Study | None:
         None where all of them together predict best; or beside a random moment, which absorbs the causes.
     """
     answer = study.answer
-    if answer is None or not study.named or study.random is not None:
+    if answer is None or not study.named or study.moment is not None:
         return None
     whole = frozenset(answer.effects)
     parts = {whole - {name}: left for name, left in steps.without.items() if name in whole}
@@ -298,15 +298,15 @@ def report_fits(nominal: Fit, chosen: Fit, nominal_out: HeldOut, chosen_out: Hel
 def gap_summary(study: Study, base: Base, shown: Reported) -> GapSummary:
     """The gap of the campaign and of every run, in noise variances of a sample."""
     ratio = base.extra + 1.0  # estimated noise over the base
-    random = study.random
+    moment = study.moment
     explained = 0.0 if study.prepared.coarse and COARSE_STEP.name in study.causes else base.extra
     predicted = {**shown.before, **shown.before_out} if study.causes else shown.before
     runs, sizes, powers = [], [], []
     for run in study.nominal.problem.data.runs:
         before = _excess(predicted[run.id]) / run.block * ratio + base.hum + base.extra
         after = _excess(shown.after[run.id]) / run.block * ratio + explained
-        if random is not None and run.id in random.process.runs:
-            after = random.process.excess / run.block * ratio + explained
+        if moment is not None and run.id in moment.process.runs:
+            after = moment.process.excess / run.block * ratio + explained
         held_out = run.id in shown.held_out
         runs.append(RunGap(run.id, before, after if study.named else before, held_out=held_out))
         sizes.append(run.reading.size * run.block)

@@ -184,7 +184,7 @@ def nearly(study: Study) -> Nearly | None:
     if rival is not None and rival.probability >= NEARLY_RIVAL * first.probability:
         return replace(found, rival=rival.effects, rival_probability=rival.probability)
     fitted = first.hypothesis
-    if fitted is None:
+    if fitted is None or fitted.moment is not None:
         return found
     chance = NEARLY_MISFIT_STDS * np.sqrt(2.0 * misfit(study.nominal).count)
     left = [name for name, x, c in zip(CHANNELS, fitted.excess, chance, strict=True) if x > c]

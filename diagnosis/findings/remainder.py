@@ -146,11 +146,11 @@ def remainder(
         excess: on held-out readings, in noise variances of a sample.
         hidden: the effects that could hide beside the answer; effects without a limit do not count.
     """
-    random, chosen = study.random, study.settings.answer
-    if random is not None:  # its runs have innovations
+    moment, chosen = study.moment, study.settings.answer
+    if moment is not None:  # its runs have innovations
         runs = zip(study.chosen.problem.data.runs, study.chosen.residuals, strict=True)
-        still = [residual for run, residual in runs if run.id not in random.process.runs]
-        both = np.concatenate([*random.process.innovations, *still])
+        still = [residual for run, residual in runs if run.id not in moment.process.runs]
+        both = np.concatenate([*moment.process.innovations, *still])
         p_value = float(chdtrc(both.size, both @ both))
     elif study.chosen is study.nominal:
         p_value = study.gap.test.p_value

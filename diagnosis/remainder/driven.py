@@ -48,7 +48,7 @@ def closable_driven(study: Study, *, significant: bool) -> Closable | None:
         LinAlgError: when the equations of a fit cannot be solved.
     """
     base = study.chosen
-    if not study.causes or not significant or study.random is not None or base.excess <= 0.0:
+    if not study.causes or not significant or study.moment is not None or base.excess <= 0.0:
         return None
     settings, laws = base.settings.remainder, list(_formulas(base))
     laws.sort(key=lambda law: -predicted_drop(base, law[1], law[0]))

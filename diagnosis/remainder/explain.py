@@ -66,7 +66,7 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
     similarity, fitted = study.similarity, study.chosen
     if not decided:
         fitted = with_scatter(study.nominal, study.chosen.problem.scatter)
-    if not study.causes or not significant or study.random is not None:
+    if not study.causes or not significant or study.moment is not None:
         return None
     # a run of few blocks has no row of an eighth of a cycle
     if fitted.excess <= 0.0 or any(path.residual.size == 0 for path in paths(fitted)):

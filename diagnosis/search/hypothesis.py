@@ -16,8 +16,10 @@ from diagnosis.likelihood.other_minima import deepest
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, linear_coefficients, misfit, resonance
 from diagnosis.model.parameters import Point
+from diagnosis.search.process_noise import ProcessNoise
 from diagnosis.search.weigh import FittedSet, least_excess, log_weight, misfit_scale
 from diagnosis.settings import WeighingSettings
+from tunnel_sim.effects import Effect
 from tunnel_sim.effects.capabilities import OwnNumbers
 from tunnel_sim.vocabulary.record import Array
 
@@ -48,16 +50,33 @@ _SAME_READING = 0.2  # noise standard deviations of a block mean
 
 
 @dataclass(frozen=True, eq=False)
+class RandomMoment:
+    """A random moment: a layer of noise under the effects of a set, and itself a cause.
+
+    Args:
+        kinds: the effects that its spectrum's parts are.
+        process: the moment as fitted.
+        left: the set with it, as input of the weighing. Its share is the excess of the innovations and of the other
+            runs over the nominal excess, the same in every channel.
+    """
+
+    kinds: tuple[type[Effect], ...]
+    process: ProcessNoise
+    left: FittedSet
+
+
+@dataclass(frozen=True, eq=False)
 class Hypothesis:
     """The nominal model with effects added, fitted.
 
     Args:
-        effects: names, in the order they were added.
-        fit: the fit.
+        effects: names, in the order they were added; without a random moment.
+        fit: the fit, in the noise of the sensor.
         textbook: the fit with the textbook form, where forms were freed; else None.
         short: the same set fitted to shorter stretches of the runs, where effects are added there.
         repeating: the same set fitted to runs that repeat exactly, from which effects are added too.
         plain: a fit with the textbook form to which free forms add no weight; None: no such fit is known.
+        moment: the random moment beside the effects; None where there is none.
     """
 
     effects: tuple[str, ...]
@@ -66,11 +85,22 @@ class Hypothesis:
     short: Hypothesis | None = None
     repeating: Fit | None = None
     plain: Fit | None = None
+    moment: RandomMoment | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the effects, sorted."""
-        return tuple(sorted(self.effects))
+        """Names of the causes, sorted; one that acts both steadily and at random once."""
+        kinds = () if self.moment is None else self.moment.kinds
+        return tuple(sorted({*self.effects, *(kind.name for kind in kinds)}))
+
+    @property
+    def fit_of_answer(self) -> Fit:
+        """The fit that an answer is stated by: beside a random moment, the one to runs that repeat.
+
+        The random motion is larger than what the runs differ by, and beside it narrow deviations would pull the
+        common parameters.
+        """
+        return self.fit if self.moment is None else self.repeating or self.fit
 
     @property
     def forms(self) -> int:
@@ -143,6 +173,8 @@ class Hypothesis:
             gap: the misfit that the set is weighed against.
             outside: as in `FittedSet`.
         """
+        if self.moment is not None:
+            return self.moment.left
         by_chance = own_gain(self.fit.problem) / self.fit.count
         share = (self.fit.excess + by_chance) / nominal.gap
         cost = self.fit.scatter_cost(gap.deviation_precision)

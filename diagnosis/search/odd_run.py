@@ -103,7 +103,7 @@ def odd_runs(measured: Campaign, study: Study) -> tuple[Disturbance, ...]:
     found = _explaining([Hypothesis((), nominal), *_sets(study)], nominal, study.prepared.kinds)
     rivals, at_random = list[Hypothesis](), None
     if answer is not None and answer.effects != UNKNOWN:
-        at_random = None if answer.random is None else answer.random.fitted_set
+        at_random = None if answer.moment is None else answer.moment.left
         rivals = [answer.hypothesis] if answer.hypothesis is not None and at_random is None else []
     rivals += [one for rival in study.rivals for one in rival.hypotheses]
     return _stated(_simplest(found, rivals, nominal, at_random), measured, nominal)
@@ -155,11 +155,10 @@ def _sets(study: Study) -> list[Hypothesis]:
     """The sets of effects that were weighed, in runs that repeat: an odd run makes them seem to differ."""
     found = []
     for answer in study.answers:
-        beside = None if answer.random is None else answer.random.beside
-        for one in (answer.hypothesis, beside):
-            fit = None if one is None else one.repeating if one.fit.problem.scatter else one.fit
-            if one is not None and fit is not None and one.effects:
-                found.append(Hypothesis(one.effects, fit))
+        one = answer.hypothesis
+        fit = None if one is None else one.repeating if one.fit.problem.scatter else one.fit
+        if one is not None and fit is not None and one.effects:
+            found.append(Hypothesis(one.effects, fit))
     return found
 
 

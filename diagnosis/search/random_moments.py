@@ -24,7 +24,7 @@ from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
 from diagnosis.search.evident import evident, needed
 from diagnosis.search.grow import grow
-from diagnosis.search.hypothesis import Hypothesis, Scale, of_more_weight, restricted
+from diagnosis.search.hypothesis import Hypothesis, RandomMoment, Scale, of_more_weight, restricted
 from diagnosis.search.one_more import sets_with_one_more
 from diagnosis.search.process_noise import (
     ProcessNoise,
@@ -60,39 +60,7 @@ LAW_STDS: Final = 2.0
 _ROUNDS = 3  # of estimating the random moment from the residuals, and the effects beside it
 
 
-@dataclass(frozen=True, eq=False)
-class RandomAnswer:
-    """A random moment, alone or beside other effects.
-
-    Args:
-        kinds: the effects that its spectrum's parts are.
-        beside: the fitted effects beside it, with residuals in the sensor's noise alone, or None.
-        fitted: the fit of these effects, or of none, in the sensor's noise and to runs that repeat. The random
-            motion is larger than what the runs differ by, and beside it narrow deviations would pull the common
-            parameters.
-        fitted_set: the weighed set. Its share is the excess of the innovations and of the other runs over the
-            nominal excess, the same in every channel.
-    """
-
-    kinds: tuple[type[Effect], ...]
-    process: ProcessNoise
-    beside: Hypothesis | None
-    fitted: Fit
-    fitted_set: FittedSet
-
-    @property
-    def share(self) -> float:
-        """Unexplained share of the gap, a fraction."""
-        return self.fitted_set.share
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """Names of the effects, sorted, without duplicates where an effect acts both steadily and at random."""
-        names = {kind.name for kind in self.kinds}
-        return tuple(sorted(names | set(() if self.beside is None else self.beside.effects)))
-
-
-def weigh_random_moments(view: RunsInView, hypotheses: Sequence[Hypothesis]) -> list[RandomAnswer]:
+def weigh_random_moments(view: RunsInView, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Try turbulence, vortices with a wandering phase, and the surroundings, under all sets of effects.
 
     Args:
@@ -173,12 +141,12 @@ class _Beside:
         """−2 ln L without constants of all runs, and the prices of parts and effects, dimensionless."""
         return _cost(self.alike[0], self.sets[0])
 
-    def answers(self) -> list[RandomAnswer]:
+    def answers(self) -> list[Hypothesis]:
         """The answers to be weighed, the likeliest first; without answers that contain an unnameable part."""
         tried = (self._answer(process, top) for process in self.alike for top in self.sets)
         return [answer for answer in tried if answer is not None]
 
-    def _answer(self, process: ProcessNoise, top: Hypothesis) -> RandomAnswer | None:
+    def _answer(self, process: ProcessNoise, top: Hypothesis) -> Hypothesis | None:
         view, first = self.view, self.sets[0]
         seen = self.seen if top is first else _seen_in(top, view.base.problem.data)
         allowed = [kind for kind in view.prepared.kinds if issubclass(kind, AtRandom)]
@@ -197,10 +165,10 @@ class _Beside:
         left = FittedSet(
             names, share, by_channel + behind, numbers, scatter_cost=cost, shown_between_runs=between
         )
-        beside = seen if seen.effects else None
-        known = view.prepared.nominal if beside is None else beside.fit
-        fitted = try_fit(*without_deviations(known)) if known.problem.scatter else known
-        return RandomAnswer(kinds, process, beside, fitted or known, left)
+        known = seen.fit if seen.effects else view.prepared.nominal
+        repeating = try_fit(*without_deviations(known)) if known.problem.scatter else known
+        moment = RandomMoment(kinds, process, left)
+        return replace(seen, fit=known, repeating=repeating or known, moment=moment)
 
 
 def _others_alike(process: ProcessNoise, shown: Sequence[ProcessNoise]) -> list[ProcessNoise]:
@@ -233,7 +201,7 @@ def _cost(process: ProcessNoise, beside: Hypothesis) -> float:
 
 
 def without_the_random_moment(
-    answers: Sequence[RandomAnswer], known: Sequence[Hypothesis], gap: ChannelMisfit
+    answers: Sequence[Hypothesis], known: Sequence[Hypothesis], gap: ChannelMisfit
 ) -> list[Hypothesis]:
     """The sets beside random moments, fitted with the sensor's noise alone, in case the moment is not real.
 
@@ -242,11 +210,10 @@ def without_the_random_moment(
     """
     found = {hypothesis.names: hypothesis for hypothesis in known}
     for answer in answers:
-        if answer.beside is not None:
-            fitted = try_fit(answer.beside.fit.problem, answer.beside.fit.point)
-            if fitted is not None:
-                alone = replace(answer.beside, fit=fitted)
-                found[alone.names] = of_more_weight(found.get(alone.names), alone, gap)
+        fitted = try_fit(answer.fit.problem, answer.fit.point) if answer.effects else None
+        if fitted is not None:
+            alone = replace(answer, fit=fitted, moment=None)
+            found[alone.names] = of_more_weight(found.get(alone.names), alone, gap)
     return list(found.values())
 
 

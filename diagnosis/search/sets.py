@@ -16,11 +16,10 @@ from diagnosis.model.fact import Fact
 from diagnosis.search.clock import StepClock
 from diagnosis.search.hypothesis import Hypothesis, restricted, with_forms
 from diagnosis.search.one_more import same_change, sets_with_one_more
-from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.rivals.rival import FoundRival, Rival
 from diagnosis.search.runs_in_view import RunsInView
 from diagnosis.search.scatter import drifting, with_scatter
-from diagnosis.search.surviving import refusal, refusal_with_moment
+from diagnosis.search.surviving import refusal
 from diagnosis.search.weigh import UNKNOWN, FittedSet, Weighed, weigh
 
 RIVAL_FORMS: Final = 0.05
@@ -40,7 +39,7 @@ class Sets:
     Args:
         view: the view.
         hypotheses: sets of effects fitted in it.
-        random: answers with a random moment that passed its tests.
+        random: sets with a random moment that passed its tests.
         rivals: causes from outside the vocabulary, weighed beside the sets.
         refused: by names of refused answers, the reason: effects that the runs do not confirm.
         unexplained_floor: the least share of the gap that all effects together leave, where that ended the search;
@@ -51,7 +50,7 @@ class Sets:
 
     view: RunsInView
     hypotheses: tuple[Hypothesis, ...]
-    random: tuple[RandomAnswer, ...] = ()
+    random: tuple[Hypothesis, ...] = ()
     rivals: tuple[FoundRival, ...] = ()
     refused: Mapping[Names, Fact] = field(default_factory=dict)
     unexplained_floor: float | None = None
@@ -61,10 +60,9 @@ class Sets:
     def weighed(self) -> list[Weighed]:
         """The answers with their probabilities, the answer first; shares are of the gap in the view."""
         base, prepared, nominal = self.view.base, self.view.prepared, self.view.gap
-        sets = [self._fitted_set(one) for one in self.hypotheses]
+        sets = [self._fitted_set(one) for one in (*self.hypotheses, *self.random)]
         outside = (one for rival in self.rivals for one in rival.hypotheses)
         sets += [one.fitted_set(self.view.repeating, nominal, outside=True) for one in outside]
-        sets += [answer.fitted_set for answer in self.random]
         if prepared.read_off:  # it may be the only cause, and is part of the gap
             sets.append(FittedSet((), 1.0, nominal.excess, scatter_cost=nominal.scatter_cost))
         nominal = replace(nominal, chi2=nominal.chi2 + prepared.hum_power(base))
@@ -91,18 +89,18 @@ class Sets:
         key = tuple(sorted(names))
         return next((h for h in self.hypotheses if h.names == key), None)
 
-    def moment(self, names: Names, steady: Hypothesis | None) -> RandomAnswer | None:
-        """The random moment among these effects; None where none qualifies, or the effects explain more without it.
+    def at_random(self, names: Names, steady: Hypothesis | None) -> Hypothesis | None:
+        """The set of these causes with a random moment; None where none qualifies, or they explain more without it.
 
         Args:
             names: sorted.
             steady: the effects fitted without a random moment, if available.
         """
-        found = next((answer for answer in self.random if answer.effects == names), None)
-        if found is None or steady is None:
+        found = next((one for one in self.random if one.names == names), None)
+        if found is None or found.moment is None or steady is None:
             return found
         share = max(steady.fit.excess, 0.0) / max(self.view.prepared.nominal.excess, 1e-9)
-        return found if found.share < share else None
+        return found if found.moment.left.share < share else None
 
     @property
     def best(self) -> Hypothesis | None:
@@ -122,7 +120,7 @@ class Sets:
         """The set that is the answer; None where that is not a fitted set, or includes a random moment."""
         names = self.weighed[0].effects
         found = self.fitted(names)
-        return found if self.moment(names, found) is None else None
+        return found if self.at_random(names, found) is None else None
 
     def without(self, names: Names, reason: Fact | None) -> Sets:
         """The sets without one that the runs do not confirm.
@@ -134,10 +132,10 @@ class Sets:
         kept = tuple(h for h in self.hypotheses if h.names != names)
         return replace(self, hypotheses=kept, refused=self._refused(names, reason))
 
-    def without_moment(self, moment: RandomAnswer, reason: Fact) -> Sets:
-        """The sets without a random moment that the runs do not confirm."""
-        kept = tuple(one for one in self.random if one is not moment)
-        return replace(self, random=kept, refused=self._refused(moment.effects, reason))
+    def without_moment(self, refused: Hypothesis, reason: Fact) -> Sets:
+        """The sets without one whose random moment the runs do not confirm."""
+        kept = tuple(one for one in self.random if one is not refused)
+        return replace(self, random=kept, refused=self._refused(refused.names, reason))
 
     def _refused(self, names: Names, reason: Fact | None) -> Mapping[Names, Fact]:
         return self.refused if reason is None else {**self.refused, names: reason}
@@ -147,7 +145,7 @@ class Sets:
         names = self.weighed[0].effects
         found = {h.names: self.view.whole(h) for h in self.hypotheses if set(h.names) < set(names)}
         if self.confirmed is not None:
-            at_random = any(moment.effects == names for moment in self.random)
+            at_random = any(one.names == names for one in self.random)
             found[names] = whole = self.confirmed if at_random else self.view.finished(self.confirmed)
             # its parts are compared with it, with the chance differences between runs of the answer
             parts = {key: part for key, part in found.items() if part is not None and key != names}
@@ -199,15 +197,15 @@ def resolved(sets: Sets) -> Sets:
     while True:
         names = sets.weighed[0].effects
         found = sets.fitted(names)
-        moment = sets.moment(names, found)
-        if moment is not None:
-            reason = refusal_with_moment(moment, sets.view.repeating)
+        at_random = sets.at_random(names, found)
+        if at_random is not None:
+            reason = refusal(at_random, sets.view.repeating)
             if reason is None:
                 return sets
-            sets = sets.without_moment(moment, reason)
+            sets = sets.without_moment(at_random, reason)
         elif found is not None:
             whole = sets.view.settled(found)
-            reason = None if whole is None else refusal(whole.fit)
+            reason = None if whole is None else refusal(whole, sets.view.repeating)
             if whole is not None and reason is None:
                 return replace(sets, confirmed=whole)
             sets = sets.without(names, reason)

@@ -15,9 +15,8 @@ from diagnosis.noise.gap import GapTest
 from diagnosis.search.choices import Choice, choices
 from diagnosis.search.clock import StepClock
 from diagnosis.search.disturbance import Disturbance
-from diagnosis.search.hypothesis import Hypothesis
+from diagnosis.search.hypothesis import Hypothesis, RandomMoment
 from diagnosis.search.prepared import Prepared
-from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.rivals.rival import FoundRival
 from diagnosis.search.scatter import evident, named, shown_by
 from diagnosis.search.sets import Names, Sets
@@ -60,30 +59,30 @@ class Answer(Weighed):
     Args:
         share: share of the gap that is unexplained, at least 0.
         probability: among all answers weighed, a fraction.
-        hypothesis: its effects without a random moment; fitted to whole runs if it is the answer of the study or a
-            part of it, else in the view in which it was weighed. None where it is not a set of effects, or its fit
-            to whole runs fails.
-        stated: the hypothesis with its parameters as stated, beside the random moment where sets are weighed so.
-        random: the random moment among its effects; None where there is none, or they explain more without it.
+        hypothesis: its set, fitted to whole runs if it is the answer of the study or a part of it, else in the view
+            in which it was weighed. None where it is not a set of causes, or its fit to whole runs fails.
+        stated: the hypothesis with its parameters as stated, in the noise of the view where sets are weighed so.
         choices: its choices that the runs cannot exclude.
     """
 
     hypothesis: Hypothesis | None = None
     stated: Hypothesis | None = None
-    random: RandomAnswer | None = None
     choices: tuple[Choice, ...] = ()
 
     @property
     def fit(self) -> Fit | None:
         """The fit of its effects; None where it has none."""
-        if self.random is not None:
-            return self.random.fitted
-        return None if self.hypothesis is None else self.hypothesis.fit
+        return None if self.hypothesis is None else self.hypothesis.fit_of_answer
+
+    @property
+    def moment(self) -> RandomMoment | None:
+        """The random moment among its causes; None where there is none."""
+        return None if self.hypothesis is None else self.hypothesis.moment
 
     def textbook_of(self, fit: Fit) -> Fit | None:
         """The fit of its textbook form, where the given fit has its forms free; else None."""
         own = self.hypothesis
-        return own.textbook if own is not None and own.fit is fit else None
+        return own.textbook if own is not None and own.moment is None and own.fit is fit else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,9 +206,9 @@ class Study:
         return answer.stated.fit
 
     @property
-    def random(self) -> RandomAnswer | None:
+    def moment(self) -> RandomMoment | None:
         """The random moment that is part of the answer, or None."""
-        return None if self.answer is None else self.answer.random
+        return None if self.answer is None else self.answer.moment
 
     def of(self, effects: Collection[str]) -> Answer | None:
         """The answer of these effects; None where they were not weighed."""
@@ -229,7 +228,8 @@ class Study:
         unknown = next((answer for answer in kept if answer.effects == UNKNOWN), Answer(UNKNOWN, 1.0, 0.0))
         part, total = self.of(names), sum(answer.probability for answer in kept) or 1.0
         least = self.settings.weighing.unknown_from * total
-        known = part is not None and part.hypothesis is not None and unknown.probability < least
+        fitted = part is not None and part.hypothesis is not None and part.moment is None
+        known = fitted and unknown.probability < least
         first = part if part is not None and known else unknown
         answers = (first, *(answer for answer in kept if answer is not first))
         return replace(
@@ -251,7 +251,9 @@ class Study:
         answers = [_answer(one, sets, whole) for one in _excused(sets, gap.test)]
         with clock.step("choices"):
             answers = [replace(one, choices=_choices(one, sets)) for one in answers]
-        single = {} if answers[0].hypothesis is None else shown_by_one(answers[0].hypothesis.fit)
+        first = answers[0]
+        steady = None if first.moment is not None or first.hypothesis is None else first.hypothesis.fit
+        single = {} if steady is None else shown_by_one(steady)
         base = sets.view.base
         return cls(
             prepared,
@@ -290,9 +292,11 @@ def _answer(weighed: Weighed, sets: Sets, whole: Mapping[Names, Hypothesis | Non
     names = weighed.effects
     in_view = sets.fitted(names)
     hypothesis = whole.get(names, in_view)
+    at_random = sets.at_random(names, hypothesis)
+    if at_random is not None:
+        return Answer(names, weighed.share, weighed.probability, at_random, at_random)
     stated = in_view if sets.view.states_parameters else hypothesis
-    moment = sets.moment(names, hypothesis)
-    return Answer(names, weighed.share, weighed.probability, hypothesis, stated, moment)
+    return Answer(names, weighed.share, weighed.probability, hypothesis, stated)
 
 
 def _excused(sets: Sets, test: GapTest) -> Sequence[Weighed]:
@@ -318,7 +322,7 @@ def noise_explains(nominal: Fit, test: GapTest, weighed: Sequence[Weighed]) -> b
 def _choices(answer: Answer, sets: Sets) -> tuple[Choice, ...]:
     """The choices of a probable answer that the runs cannot exclude, with its coefficients."""
     nominal = sets.view.prepared.nominal
-    chosen = answer.stated if answer.random is None else answer.random.beside
+    chosen = answer.stated
     if chosen is None or answer.probability < CHOICES_FROM:
         return ()
     if all(kind.chosen_spring() is None for kind in chosen.fit.problem.effects):

@@ -16,8 +16,8 @@ import numpy as np
 from diagnosis.likelihood.least_squares import Fit, FitError, fit_at
 from diagnosis.likelihood.without_run import WithoutRuns, refitted_without
 from diagnosis.model.fact import Fact
+from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.process_noise import ProcessNoise, with_response
-from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.resolved import unresolved
 from tunnel_sim.vocabulary.record import Array
 
@@ -44,12 +44,21 @@ an effect. Judgement. A residual as large as the noise. A fit that leaves more i
 runs."""
 
 
-def refusal(whole: Fit) -> Fact | None:
-    """Why a set is not an answer; None where every effect of it is confirmed.
+def refusal(answer: Hypothesis, repeating: Fit) -> Fact | None:
+    """Why a set is not an answer; None where every cause of it is confirmed.
 
     Args:
-        whole: fit of the set to whole runs.
+        answer: fitted to whole runs.
+        repeating: fit of the nominal model to runs that repeat.
     """
+    whole: Fit | None = answer.fit
+    if answer.moment is not None:
+        kinds, process = answer.moment.kinds, answer.moment.process
+        if explains_too_much(process, repeating, alone=not answer.effects):
+            return Fact("explains too much", {"effects": tuple(kind.name for kind in kinds)})
+        whole = _beside(answer, process)
+    if whole is None:
+        return None
     if unconfirmed := unresolved(whole):
         return Fact("unresolved", {"effects": unconfirmed})
     lost = contradicted(whole)
@@ -58,20 +67,13 @@ def refusal(whole: Fit) -> Fact | None:
     return Fact("contradicted", {"effects": names, "run": run}) if lost else None
 
 
-def refusal_with_moment(answer: RandomAnswer, repeating: Fit) -> Fact | None:
-    """As `refusal`, for a set with a random moment.
-
-    Args:
-        repeating: fit of the nominal model to runs that repeat.
-    """
-    beside = answer.beside
-    if explains_too_much(answer.process, repeating, alone=beside is None):
-        return Fact("explains too much", {"effects": tuple(kind.name for kind in answer.kinds)})
-    noisy = None if beside is None else with_response(beside.fit, answer.process.spectrum)
-    if beside is None or noisy is None:
+def _beside(answer: Hypothesis, process: ProcessNoise) -> Fit | None:
+    """The effects of a set in the noise of its random moment; None where there are none, or it does not settle."""
+    noisy = with_response(answer.fit, process.spectrum) if answer.effects else None
+    if noisy is None:
         return None
     try:
-        return refusal(fit_at(replace(beside.fit.problem, data=noisy), beside.fit.point))
+        return fit_at(replace(answer.fit.problem, data=noisy), answer.fit.point)
     except (FitError, np.linalg.LinAlgError):
         return None
 

@@ -20,9 +20,8 @@ from diagnosis.findings.candidates import Candidate, inclusion
 from diagnosis.likelihood.partial import fit_seen
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.data import FOLDS
-from diagnosis.search.hypothesis import Hypothesis
+from diagnosis.search.hypothesis import Hypothesis, RandomMoment
 from diagnosis.search.process_noise import ProcessNoise
-from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.random_spectra import SpectrumPart
 from diagnosis.search.study import Answer
 from diagnosis.search.weigh import FittedSet
@@ -149,11 +148,10 @@ def test_a_random_moment_comes_last_and_leaves_its_innovations(data, base):
     process = ProcessNoise(
         (SpectrumPart(0.01, 5.0),), windy, np.full(4, 2.5), np.ones(4), 5.0, 0.25, [np.ones(9)] * 4, 0.012
     )
-    random = RandomAnswer(
-        (kind,), process, Hypothesis((IDLE,), best), best, FittedSet((kind.name, IDLE), 0.01, np.zeros(6))
-    )
+    layer = RandomMoment((kind,), process, FittedSet((kind.name, IDLE), 0.01, np.zeros(6)))
+    own = Hypothesis((IDLE,), best, moment=layer)
     study = studied(data, base, (kind.name, IDLE, HUM))
-    study = replace(study, answers=(Answer((kind.name, IDLE), 0.01, 0.9, random=random),))
+    study = replace(study, answers=(Answer((kind.name, IDLE), 0.01, 0.9, own, own),))
     found = waterfall(study, replace(NO_BASE, hum=2.0))
     residuals = predict_held_out(best).residuals
     still = {run: float(np.mean(left**2)) - 1.0 for run, left in residuals.items()}

@@ -11,9 +11,10 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
 from diagnosis.findings.averaged_coefficients import coefficients, possible_answers
+from diagnosis.search.hypothesis import Hypothesis, RandomMoment
 from diagnosis.search.investigate import investigate
 from diagnosis.search.process_noise import is_of_reading, likeliest, random_moments
-from diagnosis.search.random_moments import RandomAnswer, obeys_a_law, weigh_random_moments
+from diagnosis.search.random_moments import obeys_a_law, weigh_random_moments
 from diagnosis.search.random_spectra import STREAM, SURROUNDINGS
 from diagnosis.search.scatter import differing
 from diagnosis.search.steady_noise import is_a_line, is_slow
@@ -82,19 +83,24 @@ def of(conditions: Sequence[tuple[float, float]], *effects: Effect) -> Campaign:
     return replace(data, runs=data.runs[: len(conditions)])
 
 
-def answers(data: Campaign, kinds: Sequence[type[Effect]] = ALL_RANDOM) -> list[RandomAnswer]:
+def layer(answer: Hypothesis) -> RandomMoment:
+    assert answer.moment is not None
+    return answer.moment
+
+
+def answers(data: Campaign, kinds: Sequence[type[Effect]] = ALL_RANDOM) -> list[Hypothesis]:
     return weigh_random_moments(whole_runs(nominal(data), kinds), [])
 
 
 def test_a_moment_that_acts_with_the_wind_off_as_well_is_ambient_vibration() -> None:
     (answer,) = answers(shaken(campaign(), moment=0.02))
-    assert answer.effects == ("ambient_vibration",)
-    assert answer.share < 0.1
-    (part,) = answer.process.spectrum
+    assert answer.names == ("ambient_vibration",)
+    assert layer(answer).left.share < 0.1
+    (part,) = layer(answer).process.spectrum
     assert part.intensity == pytest.approx(0.02, rel=0.3)
     # at the rig only the level of the spectrum around resonance is seen well
     assert part.intensity**2 / part.bandwidth == pytest.approx(0.02**2 / BANDWIDTH, rel=0.3)
-    assert len(answer.process.runs) == len(CONDITIONS)
+    assert len(layer(answer).process.runs) == len(CONDITIONS)
 
 
 @pytest.mark.slow
@@ -113,8 +119,8 @@ def test_stated_differences_between_runs_do_not_pull_the_coefficients() -> None:
 @pytest.mark.slow
 def test_a_moment_that_grows_with_the_pressure_is_buffeting() -> None:
     (answer,) = answers(shaken(campaign(), coefficient=0.01))
-    assert answer.effects == ("buffeting",)
-    assert answer.process.runs == ("r2", "r3", "r5", "r6")
+    assert answer.names == ("buffeting",)
+    assert layer(answer).process.runs == ("r2", "r3", "r5", "r6")
 
 
 @pytest.mark.parametrize(("moment", "wander"), [(0.0, 2e-3), (0.02, 0.0)])
@@ -151,14 +157,14 @@ def test_a_spring_of_its_own_is_no_random_moment_and_hides_none() -> None:
 @pytest.mark.slow
 def test_both_at_once_are_one_spectrum_with_a_part_of_each() -> None:
     (answer,) = answers(shaken(shaken(campaign(), moment=0.02), coefficient=0.02, seed=6))
-    assert answer.effects == ("ambient_vibration", "buffeting")
+    assert answer.names == ("ambient_vibration", "buffeting")
 
 
 @pytest.mark.slow
 def test_runs_in_one_wind_cannot_tell_them_apart() -> None:
     found = answers(shaken(of(ONE_WIND), ONE_WIND, moment=0.03))
-    assert {answer.effects for answer in found} == {("ambient_vibration",), ("buffeting",)}
-    first, second = (answer.share for answer in found)
+    assert {answer.names for answer in found} == {("ambient_vibration",), ("buffeting",)}
+    first, second = (layer(answer).left.share for answer in found)
     assert first == pytest.approx(second, abs=1e-3)
 
 
@@ -167,13 +173,13 @@ def test_of_two_kinds_that_the_runs_cannot_tell_apart_the_one_that_may_be_named_
     data = shaken(of(ONE_WIND), ONE_WIND, moment=0.03)
     for kind in (AMBIENT, BUFFETING):
         (answer,) = answers(data, (kind,))
-        assert answer.kinds == (kind,)
+        assert layer(answer).kinds == (kind,)
 
 
 @pytest.mark.slow
 def test_without_wind_it_is_the_surroundings() -> None:
     (answer,) = answers(shaken(of(STILL), STILL, moment=0.02))
-    assert answer.effects == ("ambient_vibration",)
+    assert answer.names == ("ambient_vibration",)
 
 
 @pytest.mark.parametrize("conditions", [CONDITIONS, STILL])
@@ -228,12 +234,14 @@ def test_a_steady_line_is_no_random_moment() -> None:
 @pytest.mark.slow
 def test_a_random_moment_about_a_frequency_is_no_steady_line() -> None:
     (answer,) = answers(shaken(of(STILL), STILL, moment=0.02, centre=7.0))
-    assert answer.effects == ("ambient_vibration",)
+    assert answer.names == ("ambient_vibration",)
 
 
 def test_a_moment_of_all_runs_is_not_called_buffeting_where_the_surroundings_are_excluded() -> None:
     found = answers(shaken(campaign(), moment=0.02), ALL_RANDOM[:2])
-    assert all(answer.share > 0.2 for answer in found)  # the runs with the wind off keep their gap
+    assert all(
+        layer(answer).left.share > 0.2 for answer in found
+    )  # the runs with the wind off keep their gap
 
 
 def test_the_moment_of_the_surroundings_has_the_scale_of_the_rig() -> None:

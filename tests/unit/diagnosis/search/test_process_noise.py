@@ -15,11 +15,12 @@ from diagnosis.search import process_noise as pn
 from diagnosis.search import random_moments
 from diagnosis.search.evident import needed
 from diagnosis.search.grow import grow
-from diagnosis.search.hypothesis import Hypothesis
+from diagnosis.search.hypothesis import Hypothesis, RandomMoment
 from diagnosis.search.process_noise import with_response
 from diagnosis.search.random_moments import excess_elsewhere, is_no_noise, obeys_a_law, weigh_random_moments
 from diagnosis.search.random_spectra import BROAD, CENTRED, STREAM, SpectrumPart, wandering
 from diagnosis.search.steady_noise import bursts, departure_from_white, is_steady_noise, of_all_runs
+from diagnosis.search.weigh import FittedSet
 from diagnosis.settings import Settings
 from tests.marks import slow
 from tests.reference.linear_rig import response
@@ -44,6 +45,15 @@ from tunnel_sim.vocabulary.record import Record
 AREA, LENGTH = 0.036, 0.625
 BUFFETING = (effect_class("buffeting"),)
 BOTH = (*BUFFETING, effect_class("vortex_shedding"))
+
+
+def moment_of(answer: Hypothesis) -> RandomMoment:
+    assert answer.moment is not None
+    return answer.moment
+
+
+def left(answer: Hypothesis) -> FittedSet:
+    return moment_of(answer).left
 
 
 def buffeted(data, intensity, bandwidth, seed=5):
@@ -173,7 +183,7 @@ def test_a_law_that_is_missing_is_no_random_moment(monkeypatch):
     assert is_no_noise(base)  # so that none is even sought
     assert weigh_random_moments(whole_runs(base, BOTH), []) == []
     monkeypatch.setattr(random_moments, "is_no_noise", lambda _: False)
-    assert [answer.effects for answer in weigh_random_moments(whole_runs(base, BOTH), [])] == [("buffeting",)]
+    assert [answer.names for answer in weigh_random_moments(whole_runs(base, BOTH), [])] == [("buffeting",)]
 
 
 @pytest.mark.parametrize("bandwidth", [slow(0.05), slow(0.5), 10.0])
@@ -186,8 +196,8 @@ def test_a_random_moment_obeys_no_law(bandwidth):
 
 def test_buffeting_is_offered_where_it_blows(windy):
     (answer,) = weigh_random_moments(whole_runs(windy, BOTH), [])
-    assert answer.effects == ("buffeting",)
-    assert answer.share < 0.1
+    assert answer.names == ("buffeting",)
+    assert left(answer).share < 0.1
 
 
 def test_turbulence_is_not_called_vortices_where_buffeting_is_excluded():
@@ -206,7 +216,7 @@ def test_weak_turbulence_is_seen_beside_a_spring_that_closes_all_but_a_hundredth
     spring = Hypothesis(("cubic_stiffness",), fit(start.problem, start.point, base=base))
     assert 0.005 < spring.fit.excess / base.excess < 0.015
     (answer,) = weigh_random_moments(whole_runs(base, (*BUFFETING, type(strong))), [spring])
-    assert answer.effects == ("buffeting", "cubic_stiffness")
+    assert answer.names == ("buffeting", "cubic_stiffness")
 
 
 def test_a_rival_beside_turbulence_is_an_answer_as_well():
@@ -216,8 +226,8 @@ def test_a_rival_beside_turbulence_is_an_answer_as_well():
     spring = Hypothesis(("cubic_stiffness",), fit(start.problem, start.point, base=base))
     view = whole_runs(base, (*BUFFETING, type(strong), OwnCubic, effect_class("coulomb_friction")))
     one, other = weigh_random_moments(view, [spring])
-    assert {one.effects, other.effects} == {("buffeting", "cubic_stiffness"), ("buffeting", "own_cubic")}
-    assert other.fitted_set.excess == pytest.approx(one.fitted_set.excess, rel=0.01, abs=1.0)
+    assert {one.names, other.names} == {("buffeting", "cubic_stiffness"), ("buffeting", "own_cubic")}
+    assert left(other).excess == pytest.approx(left(one).excess, rel=0.01, abs=1.0)
 
 
 @pytest.mark.slow
@@ -230,11 +240,11 @@ def test_skips_beside_strong_turbulence_are_placed_where_they_are():
     assert np.max(np.abs(white.point.per_run[:, -1] - planted)) > 0.05
     kinds = (*BUFFETING, effect_class("dropped_samples"))
     (answer,) = weigh_random_moments(whole_runs(base, kinds), [Hypothesis(("dropped_samples",), white)])
-    assert answer.effects == ("buffeting", "dropped_samples")
-    found = answer.beside.fit
+    assert answer.names == ("buffeting", "dropped_samples")
+    found = answer.fit
     assert found.point.per_run[:, -1] == pytest.approx(planted, abs=0.005)
     assert found.value("dropped_samples.lost_time") == pytest.approx(0.006, rel=0.01)
-    assert abs(excess_elsewhere(found, answer.process.runs)) < 0.1
+    assert abs(excess_elsewhere(found, moment_of(answer).process.runs)) < 0.1
 
 
 @pytest.mark.slow
@@ -246,11 +256,11 @@ def test_beside_turbulence_that_misleads_all_sets_they_are_grown_anew():
     kinds = [effect_class(name) for name in names]
     misled = grow(whole_runs(base, kinds[1:]))
     (answer,) = weigh_random_moments(whole_runs(base, kinds), misled)
-    assert answer.effects == ("buffeting", "coulomb_friction", "cubic_stiffness")
-    found = answer.beside.fit
+    assert answer.names == ("buffeting", "coulomb_friction", "cubic_stiffness")
+    found = answer.fit
     assert found.value("coulomb_friction.friction_moment") == pytest.approx(0.003, rel=0.05)
     assert found.value("cubic_stiffness.coefficient") == pytest.approx(-0.03, rel=0.05)
-    assert abs(excess_elsewhere(found, answer.process.runs)) < 0.1
+    assert abs(excess_elsewhere(found, moment_of(answer).process.runs)) < 0.1
 
 
 def test_an_effect_of_the_wind_that_is_weak_beside_turbulence_is_found():
@@ -258,14 +268,14 @@ def test_an_effect_of_the_wind_that_is_weak_beside_turbulence_is_found():
     base = nominal(buffeted(campaign(effect_from("nonlinear_yaw_moment", {"coefficient": 0.6})), 0.004, 4.0))
     kinds = (*BUFFETING, effect_class("nonlinear_yaw_moment"), effect_class("nonlinear_yaw_damping"))
     (answer,) = weigh_random_moments(whole_runs(base, kinds), [])
-    assert answer.effects == ("buffeting", "nonlinear_yaw_moment")
-    assert answer.beside.fit.value("nonlinear_yaw_moment.coefficient") == pytest.approx(0.6, rel=0.5)
+    assert answer.names == ("buffeting", "nonlinear_yaw_moment")
+    assert answer.fit.value("nonlinear_yaw_moment.coefficient") == pytest.approx(0.6, rel=0.5)
 
 
 def test_a_random_moment_closes_little_of_a_gap_that_is_in_still_air_too():
     base = nominal(campaign(effect_from("cubic_stiffness", {"coefficient": -0.2})))
     found = weigh_random_moments(whole_runs(base, (*BUFFETING, effect_class("coulomb_friction"))), [])
-    assert all(answer.share > 0.2 for answer in found)
+    assert all(left(answer).share > 0.2 for answer in found)
 
 
 def test_turbulence_as_noise_leaves_white_residuals_of_the_stated_variance(windy, found):
@@ -333,7 +343,7 @@ def test_of_sets_that_the_rounds_go_to_and_fro_between_the_likeliest_is_taken(mo
 
     monkeypatch.setattr(random_moments, "grow", grown)
     (answer,) = weigh_random_moments(whole_runs(drifting, BUFFETING), [])
-    assert answer.effects == ("buffeting", "cubic_stiffness", "sensor_drift")
+    assert answer.names == ("buffeting", "cubic_stiffness", "sensor_drift")
 
 
 def test_a_gap_in_still_air_is_no_buffeting():
@@ -389,8 +399,8 @@ def test_vortices_whose_phase_wanders_are_shedding_and_not_turbulence():
     assert found.spectrum[0].strouhal_number == pytest.approx(strouhal, rel=0.01)
     assert np.sqrt(2.0) * found.spectrum[0].intensity == pytest.approx(0.05, rel=0.4)
     (answer,) = weigh_random_moments(whole_runs(fit, BOTH), [])
-    assert answer.effects == ("vortex_shedding",)
-    assert answer.share < 0.1
+    assert answer.names == ("vortex_shedding",)
+    assert left(answer).share < 0.1
     assert weigh_random_moments(whole_runs(fit, BUFFETING), []) == []
 
 
@@ -400,8 +410,8 @@ def test_at_one_wind_speed_vortices_are_not_told_from_turbulence_about_a_frequen
     fastest = max(run.wind_speed for run in data.runs)
     one_speed = replace(data, runs=tuple(run for run in data.runs if run.wind_speed in (0.0, fastest)))
     found = weigh_random_moments(whole_runs(nominal(one_speed), BOTH), [])
-    assert {answer.effects for answer in found} == {("vortex_shedding",), ("buffeting",)}
-    assert found[0].share == pytest.approx(found[1].share, abs=0.02)
+    assert {answer.names for answer in found} == {("vortex_shedding",), ("buffeting",)}
+    assert left(found[0]).share == pytest.approx(left(found[1]).share, abs=0.02)
 
 
 def both_at_once():
@@ -419,8 +429,8 @@ def test_turbulence_and_vortices_at_once_are_one_spectrum_with_two_parts():
     for alone in (fit_turbulence(base), fit_turbulence(base, centred=True), fit_wandering_shedding(base)):
         assert not is_steady_noise(alone, Settings().moment)
     (answer,) = weigh_random_moments(whole_runs(base, BOTH), [])
-    assert answer.effects == ("buffeting", "vortex_shedding")
-    parts = {part.band: part for part in answer.process.spectrum}
+    assert answer.names == ("buffeting", "vortex_shedding")
+    parts = {part.band: part for part in moment_of(answer).process.spectrum}
     assert parts["broad_band"].intensity == pytest.approx(0.006, rel=0.5)
     assert parts["narrow_band"].strouhal_number == pytest.approx(0.15, rel=0.01)
     assert np.sqrt(2.0) * parts["narrow_band"].intensity == pytest.approx(0.05, rel=0.4)
@@ -468,7 +478,7 @@ def test_turbulence_of_another_spectrum_is_not_called_vortices_beside_turbulence
     found = pn.likeliest(pn.random_moments(base, STREAM), Settings().moment)
     assert [part.band for part in found.spectrum] == ["broad_band", "broad_band"]
     (answer,) = weigh_random_moments(whole_runs(base, BOTH), [])
-    assert answer.effects == ("buffeting",)
+    assert answer.names == ("buffeting",)
 
 
 def about_a_frequency(bandwidth, centre):

@@ -13,9 +13,8 @@ from diagnosis.answer.held_out import excess_base
 from diagnosis.noise.gap import GapTest
 from diagnosis.noise.mains import Hum
 from diagnosis.search.clock import StepClock
-from diagnosis.search.hypothesis import Hypothesis
+from diagnosis.search.hypothesis import Hypothesis, RandomMoment
 from diagnosis.search.prepared import HUM_LEFT
-from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.sets import Sets, resolved
 from diagnosis.search.study import Study, noise_explains
 from diagnosis.search.views import by_moment as moments
@@ -44,15 +43,16 @@ def study() -> Study:
     return studied(data, _with_excess(nominal(data), 1.0))
 
 
-def weighed(study: Study, moment: RandomAnswer | None = None) -> Sets:
+def weighed(study: Study, moment: Hypothesis | None = None) -> Sets:
     """A fit with vortex shedding leaves half of the gap."""
     steady = Hypothesis(("vortex_shedding",), _with_excess(study.nominal, 0.5))
     view = WholeRuns(study.prepared, study.nominal)
     return Sets(view, (steady,), () if moment is None else (moment,), confirmed=steady)
 
 
-def shedding(share: float) -> RandomAnswer:
-    return RandomAnswer((effect_class("vortex_shedding"),), None, None, None, left(share))  # type: ignore[arg-type]
+def shedding(share: float) -> Hypothesis:
+    layer = RandomMoment((effect_class("vortex_shedding"),), None, left(share))  # type: ignore[arg-type]
+    return Hypothesis((), None, moment=layer)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("share", "is_random"), [(0.4, True), (0.6, False)])
@@ -61,7 +61,7 @@ def test_a_random_moment_answers_where_it_leaves_less_than_the_steady_one(
 ) -> None:
     moment = shedding(share)
     sets = weighed(study, moment)
-    asked = sets.moment(("vortex_shedding",), sets.hypotheses[0])
+    asked = sets.at_random(("vortex_shedding",), sets.hypotheses[0])
     assert (asked is moment) == is_random
 
 

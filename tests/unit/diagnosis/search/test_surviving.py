@@ -13,8 +13,8 @@ import pytest
 from diagnosis.likelihood.least_squares import Fit, fit
 from diagnosis.likelihood.without_run import WithoutRuns, refitted_without
 from diagnosis.model.parameters import Point
+from diagnosis.search.hypothesis import Hypothesis, RandomMoment
 from diagnosis.search.process_noise import ProcessNoise
-from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.sets import Sets, resolved
 from diagnosis.search.surviving import contradicted, explains_too_much, refusal, shown_by_one
 from diagnosis.search.weigh import FittedSet
@@ -108,7 +108,8 @@ def test_a_set_with_a_random_moment_is_judged_as_others_are() -> None:
     base = nominal(campaign(CUBIC, duration=6.0))
     kind = effect_class("ambient_vibration")
     names = (kind.name,)
-    answer = RandomAnswer((kind,), moment(10.0 * base.total), None, base, FittedSet(names, 0.0, np.zeros(6)))
+    layer = RandomMoment((kind,), moment(10.0 * base.total), FittedSet(names, 0.0, np.zeros(6)))
+    answer = Hypothesis((), base, moment=layer)
     found = resolved(Sets(whole_runs(base), (), random=(answer,)))
     assert found.random == ()
     assert found.refused[names].kind == "explains too much"
