@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Final
 
 from diagnosis.likelihood.residuals import ChannelMisfit
@@ -20,30 +20,49 @@ MOST_CAUSES: Final = 5
 one."""
 
 
-def grow(
-    view: RunsInView,
-    progress: Progress | None = None,
-    enough: Callable[[Sequence[Hypothesis]], bool] | None = None,
-) -> list[Hypothesis]:
+@dataclass(frozen=True, eq=False)
+class Grown:
+    """What has been grown up to a size.
+
+    Args:
+        found: all fitted sets, best first.
+        level: the sets to which an effect is added next; empty at the end.
+    """
+
+    found: tuple[Hypothesis, ...]
+    level: tuple[Hypothesis, ...]
+
+
+def levels(view: RunsInView, progress: Progress | None = None) -> Iterator[Grown]:
     """Add effects one at a time to the best few sets of each size, in a view of the runs.
 
     Args:
         progress: called with the names of each set that is tried.
-        enough: whether sets larger than a level's are needless; None: never.
 
-    Returns:
-        Fitted hypotheses of all sizes, best first. Growth ends where the evidence for a larger set falls or cannot
-        rise, and at the greatest number of causes.
+    Yields:
+        The sets of each size, the smallest first. Growth ends where the evidence for a larger set falls or cannot
+        rise, and at the greatest number of causes; whoever asks may end it earlier.
     """
     first, gap = view.smallest, view.gap
     level = [first]
     # that the runs differ by chance alone is an answer too
     found = {first.names: first} if first.effects or first.fit.problem.scatter else {}
-    while level and not (enough is not None and enough(level)):
+    while level:
+        yield _grown(found, level)
         children = _likeliest(view.with_forms(view.larger(level, progress), level), gap, view)
         found |= {child.names: child for child in children}
         level = view.to_grow(level, going_on(children, level, gap, in_pairs=level[0] is first))
-    return sorted(found.values(), key=lambda h: h.fit.total)
+    yield _grown(found, level)
+
+
+def _grown(found: Mapping[tuple[str, ...], Hypothesis], level: Sequence[Hypothesis]) -> Grown:
+    return Grown(tuple(sorted(found.values(), key=lambda h: h.fit.total)), tuple(level))
+
+
+def grow(view: RunsInView, progress: Progress | None = None) -> list[Hypothesis]:
+    """The fitted sets of all sizes, best first (`levels`)."""
+    *_, last = levels(view, progress)
+    return list(last.found)
 
 
 def going_on(

@@ -14,7 +14,7 @@ from diagnosis.likelihood.residuals import ChannelMisfit, gap_left, misfit
 from diagnosis.model.blocks import without_long_rest
 from diagnosis.model.chance import Scatter
 from diagnosis.search.clock import StepClock
-from diagnosis.search.grow import grow
+from diagnosis.search.grow import levels
 from diagnosis.search.hypothesis import Hypothesis, Scale, of_more_weight, polish, with_forms
 from diagnosis.search.prepared import Prepared
 from diagnosis.search.random_moments import weigh_random_moments, without_the_random_moment
@@ -140,25 +140,23 @@ class WholeRuns(View):
         """
         if self.unscattered is not None or self.first is not None:
             return _with_moments(super().sets(clock), clock)
-        explained = list(self.explained)
-        beyond: list[float] = []
-
-        def enough(level: Sequence[Hypothesis]) -> bool:
-            # the test allows deviations of every run, so nothing is tried beside them
-            beyond.extend(self._beyond_reach(level))
-            tried = () if beyond else (self.beside(one) for one in level)
-            explained.extend(one for one in tried if one is not None and self._explains(one))
-            return bool(explained or beyond)
-
+        grown, explained = self.known, self.explained
+        floor: float | None = None
         with clock.step("effects"):
-            grown = list(self.known) if explained else grow(self, clock.progress, enough)
+            for step in () if explained else levels(self, clock.progress):
+                grown, floor = step.found, self._floor(step.level)
+                # the floor allows deviations of every run, so nothing is tried beside them
+                tried = map(self.beside, step.level if floor is None else ())
+                explained = tuple(one for one in tried if one is not None and self._explains(one))
+                if explained or floor is not None:
+                    break
             scale = Scale.of((*grown, self.smallest), self.gap, self.base.settings.weighing)
             likely = sorted(grown, key=lambda one: -scale.weight(one))[:BESIDE_SCATTER]
         if explained:
             return _with_moments(self._beside_scatter(likely, self.likeliest_part(explained), clock), clock)
-        found = Sets(self, tuple(grown), unexplained_floor=beyond[0] if beyond else None)
+        found = Sets(self, grown, unexplained_floor=floor)
         beside: Sets | None = None
-        if found.weighed[0].effects == UNKNOWN and not beyond and self.scattering is not None:
+        if found.weighed[0].effects == UNKNOWN and floor is None and self.scattering is not None:
             beside = self._beside_scatter(likely, None, clock)
             if any(one.effects and self._explains(one) for one in beside.hypotheses):
                 return _with_moments(beside, clock)  # nothing remains for a random moment
@@ -170,16 +168,18 @@ class WholeRuns(View):
         beside = _with_moments(beside or Sets(self._differing(None), (self._none,)), clock)
         return plain if beside.weighed[0].effects == UNKNOWN else beside
 
-    def _beyond_reach(self, level: Sequence[Hypothesis]) -> list[float]:
+    def _floor(self, level: Sequence[Hypothesis]) -> float | None:
         """The least share of the gap that all effects together leave, where no larger set could be the cause.
 
-        Computed where the sets of a level leave most of the gap; else empty.
+        Computed where the sets of a level leave most of the gap; else None.
         """
         gap = self.base.total - self.base.count
-        if any(not one.effects or one.fit.total - one.fit.count < REACH_FROM * gap for one in level):
-            return []
+        if not level or any(
+            not one.effects or one.fit.total - one.fit.count < REACH_FROM * gap for one in level
+        ):
+            return None
         left = unexplained_floor(self.base, self.able, self.prepared.kinds)
-        return [left] if left > OUT_OF_REACH else []
+        return left if left > OUT_OF_REACH else None
 
     def beside(self, one: Hypothesis) -> Hypothesis | None:
         """A set beside chance differences between the runs, its forms free where the runs need that.
@@ -247,14 +247,13 @@ class WholeRuns(View):
                 none, and they are grown from scatter alone, as long as one nearly explains the runs.
         """
         none, view = self._none, self._differing(explained)
-
-        def unexplained(level: Sequence[Hypothesis]) -> bool:
-            if explained is not None or not any(one.effects for one in level):
-                return False
-            return not any(self._leaves_less(one, GROWN_BESIDE) for one in level)
-
+        grown = tuple[Hypothesis, ...]()
         with clock.step("effects"):
-            grown = grow(view, clock.progress, unexplained)
+            for step in levels(view, clock.progress):
+                grown = step.found
+                larger = [one for one in step.level if one.effects and explained is None]
+                if larger and not any(self._leaves_less(one, GROWN_BESIDE) for one in larger):
+                    break
             others = (self.beside(one) for one in likely)
             found: dict[tuple[str, ...], Hypothesis] = {}
             for one in filter(None, (none, *others, *grown)):
