@@ -235,15 +235,31 @@ def _may_act(source: MomentSource, best: Hypothesis, scale: Scale, kinds: Sequen
         weight = log_weight(left, scale.misfit, count, best.further_numbers, scale.chosen, costs, between)
         if weight > scale.weight(best):
             return not is_no_noise(best.fit)
-    chosen = best.fit.settings.moment
-    process = likeliest(random_moments(best.fit, source), chosen)
-    if process is None or not _shown_apart(process, source, best.fit, kinds):
+    return _shows(source, best.fit, kinds) and not is_no_noise(best.fit)
+
+
+def is_shaken(fitted: Fit, kinds: Sequence[type[Effect]]) -> bool:
+    """Whether a residual shows a random moment that may be named.
+
+    Args:
+        kinds: the effects that may be named.
+    """
+    named = [source for source in SOURCES if any(source.may_be(kind) for kind in kinds)]
+    runs = fitted.problem.data.runs
+    return any(_shows(one, fitted, kinds) for one in named if any(map(one.acts, runs)))
+
+
+def _shows(source: MomentSource, fitted: Fit, kinds: Sequence[type[Effect]]) -> bool:
+    """Whether a residual is the steady noise of a source, and no noise of the reading."""
+    chosen = fitted.settings.moment
+    process = likeliest(random_moments(fitted, source), chosen)
+    if process is None or not _shown_apart(process, source, fitted, kinds):
         return False
     if source.in_every_run and (
-        is_of_reading(best.fit, process) or is_a_line(best.fit, process) or is_slow(best.fit, process, source)
+        is_of_reading(fitted, process) or is_a_line(fitted, process) or is_slow(fitted, process, source)
     ):
         return False
-    return is_steady_noise(process, chosen) and not is_no_noise(best.fit)
+    return is_steady_noise(process, chosen)
 
 
 def _is_random(process: ProcessNoise, source: MomentSource, fitted: Fit) -> bool:
@@ -396,7 +412,7 @@ def _settled(
             if noisy is None:
                 break
             base = with_likeliest_widths(fit(replace(nominal.problem, data=noisy), nominal.point))
-            sets = [Hypothesis((), base), *grow(view.on(base))]
+            sets = [Hypothesis((), base), *_in_noise_of(base, best), *grow(view.on(base))]
             found = max(sets, key=Scale.of(sets, gap_left(base), base.settings.weighing).weight)
             # a random moment leaves little of a gap for comparing effects where it acts: more are added while one
             # seen there alone is evident, the most evident of all, so that none absorbs the residual of another
@@ -414,6 +430,13 @@ def _settled(
         if len(reached) > 1:  # alternates between sets
             top = min(reached.values(), key=lambda one: _explained(source, _seen_in(one, data))[0])
     return top, exchanges
+
+
+def _in_noise_of(base: Fit, known: Hypothesis) -> list[Hypothesis]:
+    """A set found without the random moment, in its noise: a nominal model that loses the phase grows none."""
+    problem = replace(known.fit.problem, data=base.problem.data)
+    fitted = try_fit(problem, known.fit.point) if known.effects else None
+    return [] if fitted is None else [Hypothesis(known.effects, with_likeliest_widths(fitted))]
 
 
 def _sought_again(hypothesis: Hypothesis) -> Hypothesis:

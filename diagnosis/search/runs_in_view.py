@@ -109,8 +109,8 @@ class RunsInView:
         del answer, settled
         return True
 
-    def of_differing_runs(self, likely: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
-        """Likely sets fitted to whole runs, where the runs differ beside one of them and the view cannot say so."""
+    def for_whole_runs(self, likely: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
+        """Likely sets fitted to whole runs, where these show noise beside one that the view cannot show."""
         del likely
         return ()
 

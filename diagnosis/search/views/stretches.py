@@ -25,6 +25,7 @@ from diagnosis.search.clock import Progress, StepClock
 from diagnosis.search.hypothesis import Hypothesis, with_forms
 from diagnosis.search.one_more import sets_with_one_more
 from diagnosis.search.prepared import Prepared, fit_nominal
+from diagnosis.search.random_moments import is_shaken
 from diagnosis.search.runs_in_view import FORM_OPEN
 from diagnosis.search.scatter import scattered
 from diagnosis.search.sets import Sets
@@ -228,12 +229,13 @@ class InStretches(View):
             return replace(hypothesis, fit=whole)
         return None
 
-    def of_differing_runs(self, likely: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
-        """The likely sets fitted to whole runs, where the runs differ beside one of them; else none.
+    def for_whole_runs(self, likely: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
+        """The likely sets fitted to whole runs, where the runs differ or are shaken beside one of them; else none.
 
-        Chance differences between runs are compared in whole runs alone. In stretches they would be taken for
-        effects, and the coefficients for uncertain.
+        Chance differences between runs and random moments are compared in whole runs alone. In stretches the first
+        would be taken for effects, and the releases of the stretches would absorb the second.
         """
         found = sorted(filter(None, map(self.whole, likely)), key=lambda one: one.fit.total)
-        differ = any(scattered(one.fit, self.prepared.kinds) is not None for one in found)
-        return tuple(found) if differ else ()
+        kinds = self.prepared.kinds
+        differ = any(scattered(one.fit, kinds) is not None for one in found)
+        return tuple(found) if differ or any(is_shaken(one.fit, kinds) for one in found[:1]) else ()

@@ -60,7 +60,7 @@ class WholeRuns(View):
     Args:
         first: the set that all others contain; None: the empty set.
         unscattered: the nominal fit with runs that repeat exactly, where the base's runs do not.
-        known: the likely sets of another view, beside which the runs differ.
+        known: the likely sets of another view, beside which the runs may differ or be shaken.
     """
 
     first: Hypothesis | None = None
@@ -71,21 +71,21 @@ class WholeRuns(View):
 
     @classmethod
     def after(cls, prepared: Prepared, known: Sets | None, clock: StepClock) -> Self | None:
-        """The first view, or one after a view whose answer does not hold in whole runs, or whose runs differ."""
+        """The first view, or one after a view whose answer does not hold in whole runs, or lacks their noise."""
         holds = known is not None and known.view.holds(known.answer, known.confirmed)
         with clock.step("effects"):
-            others = () if known is None else known.view.of_differing_runs(known.likely)
+            others = () if known is None else known.view.for_whole_runs(known.likely)
             if holds and not others:
                 return None
             view = cls.of(prepared, others)
-            return None if holds and not view.explained else view
+            return None if holds and not (view.explained or view.shaken) else view
 
     @classmethod
     def of(cls, prepared: Prepared, known: tuple[Hypothesis, ...] = ()) -> Self:
         """Whole runs, with the nominal model fitted to them.
 
         Args:
-            known: the likely sets of another view, beside which the runs differ.
+            known: the likely sets of another view, fitted to whole runs.
         """
         first = prepared.ringing
         moving, rested = without_long_rest(prepared.nominal.problem.data)
@@ -105,6 +105,11 @@ class WholeRuns(View):
         """The known sets that explain every run by itself, beside chance differences between the runs."""
         tried = (self.beside(one) for one in self.known)
         return tuple(one for one in tried if one is not None and self._explains(one))
+
+    @cached_property
+    def shaken(self) -> tuple[Hypothesis, ...]:
+        """The sets with a random moment beside a known one; none without known sets."""
+        return tuple(weigh_random_moments(self, self.known)) if self.known else ()
 
     @property
     def repeating(self) -> Fit:
@@ -141,6 +146,8 @@ class WholeRuns(View):
         if self.unscattered is not None or self.first is not None:
             return _with_moments(super().sets(clock), clock)
         grown, explained = self.known, self.explained
+        if self.shaken and not explained:
+            return _with(self.shaken, Sets(self, grown))
         floor: float | None = None
         with clock.step("effects"):
             for step in () if explained else levels(self, clock.progress):
@@ -316,6 +323,10 @@ class WholeRuns(View):
 def _with_moments(found: Sets, clock: StepClock) -> Sets:
     """Sets, and the random moments that may act beside them."""
     with clock.step("random moments"):
-        random = weigh_random_moments(found.view, found.hypotheses)
-        sets = without_the_random_moment(random, found.hypotheses, found.view.gap)
+        return _with(weigh_random_moments(found.view, found.hypotheses), found)
+
+
+def _with(random: Sequence[Hypothesis], found: Sets) -> Sets:
+    """Sets with random moments, and without them: a moment may not be real."""
+    sets = without_the_random_moment(random, found.hypotheses, found.view.gap)
     return replace(found, random=tuple(random), hypotheses=tuple(sets))
