@@ -61,7 +61,7 @@ def test_a_fit_without_a_run_is_the_linear_one(shared: Fit) -> None:
 def test_a_cause_of_all_runs_survives_the_loss_of_each(shared: Fit) -> None:
     assert contradicted(shared) == {}
     assert shown_by_one(shared) == {}
-    assert refusal(shared) is None
+    assert refusal(Hypothesis((), shared), shared) is None
 
 
 def test_an_effect_of_one_run_is_contradicted_by_the_others() -> None:
