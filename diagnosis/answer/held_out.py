@@ -17,7 +17,7 @@ from diagnosis.likelihood.residuals import resonance
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.data import FOLDS, folds
 from diagnosis.model.parameters import Point
-from diagnosis.search.hypothesis import RandomMoment, restricted
+from diagnosis.search.hypothesis import MomentLayer, restricted
 from diagnosis.search.prepared import COARSE_STEP, HUM
 from diagnosis.search.scatter import with_scatter, without_deviations
 from diagnosis.search.study import Study
@@ -398,7 +398,7 @@ class _Models:
             self._excess[fitted] = self._in_samples(self._predicted(fitted))
         return self._excess[fitted]
 
-    def random_excess(self, moment: RandomMoment) -> float:
+    def random_excess(self, moment: MomentLayer) -> float:
         """Residual gap of all causes and a random moment: the moment's innovations where it acts."""
         runs = self._study.nominal.problem.data.runs
         still = self._predicted(self._study.chosen)

@@ -50,7 +50,7 @@ _SAME_READING = 0.2  # noise standard deviations of a block mean
 
 
 @dataclass(frozen=True, eq=False)
-class RandomMoment:
+class MomentLayer:
     """A random moment: a layer of noise under the effects of a set, and itself a cause.
 
     Args:
@@ -85,7 +85,7 @@ class Hypothesis:
     short: Hypothesis | None = None
     repeating: Fit | None = None
     plain: Fit | None = None
-    moment: RandomMoment | None = None
+    moment: MomentLayer | None = None
 
     @property
     def names(self) -> tuple[str, ...]:

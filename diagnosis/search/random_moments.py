@@ -24,7 +24,7 @@ from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
 from diagnosis.search.evident import evident, needed
 from diagnosis.search.grow import grow
-from diagnosis.search.hypothesis import Hypothesis, RandomMoment, Scale, of_more_weight, restricted
+from diagnosis.search.hypothesis import Hypothesis, MomentLayer, Scale, of_more_weight, restricted
 from diagnosis.search.one_more import sets_with_one_more
 from diagnosis.search.process_noise import (
     ProcessNoise,
@@ -167,7 +167,7 @@ class _Beside:
         )
         known = seen.fit if seen.effects else view.prepared.nominal
         repeating = try_fit(*without_deviations(known)) if known.problem.scatter else known
-        moment = RandomMoment(kinds, process, left)
+        moment = MomentLayer(kinds, process, left)
         return replace(seen, fit=known, repeating=repeating or known, moment=moment)
 
 

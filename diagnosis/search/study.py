@@ -15,7 +15,7 @@ from diagnosis.noise.gap import GapTest
 from diagnosis.search.choices import Choice, choices
 from diagnosis.search.clock import StepClock
 from diagnosis.search.disturbance import Disturbance
-from diagnosis.search.hypothesis import Hypothesis, RandomMoment
+from diagnosis.search.hypothesis import Hypothesis, MomentLayer
 from diagnosis.search.prepared import Prepared
 from diagnosis.search.rivals.rival import FoundRival
 from diagnosis.search.scatter import evident, named, shown_by
@@ -75,7 +75,7 @@ class Answer(Weighed):
         return None if self.hypothesis is None else self.hypothesis.fit_of_answer
 
     @property
-    def moment(self) -> RandomMoment | None:
+    def moment(self) -> MomentLayer | None:
         """The random moment among its causes; None where there is none."""
         return None if self.hypothesis is None else self.hypothesis.moment
 
@@ -206,7 +206,7 @@ class Study:
         return answer.stated.fit
 
     @property
-    def moment(self) -> RandomMoment | None:
+    def moment(self) -> MomentLayer | None:
         """The random moment that is part of the answer, or None."""
         return None if self.answer is None else self.answer.moment
 

@@ -20,7 +20,7 @@ from diagnosis.findings.candidates import Candidate, inclusion
 from diagnosis.likelihood.partial import fit_seen
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.data import FOLDS
-from diagnosis.search.hypothesis import Hypothesis, RandomMoment
+from diagnosis.search.hypothesis import Hypothesis, MomentLayer
 from diagnosis.search.process_noise import ProcessNoise
 from diagnosis.search.random_spectra import SpectrumPart
 from diagnosis.search.study import Answer
@@ -148,7 +148,7 @@ def test_a_random_moment_comes_last_and_leaves_its_innovations(data, base):
     process = ProcessNoise(
         (SpectrumPart(0.01, 5.0),), windy, np.full(4, 2.5), np.ones(4), 5.0, 0.25, [np.ones(9)] * 4, 0.012
     )
-    layer = RandomMoment((kind,), process, FittedSet((kind.name, IDLE), 0.01, np.zeros(6)))
+    layer = MomentLayer((kind,), process, FittedSet((kind.name, IDLE), 0.01, np.zeros(6)))
     own = Hypothesis((IDLE,), best, moment=layer)
     study = studied(data, base, (kind.name, IDLE, HUM))
     study = replace(study, answers=(Answer((kind.name, IDLE), 0.01, 0.9, own, own),))

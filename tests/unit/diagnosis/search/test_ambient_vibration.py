@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
 from diagnosis.findings.averaged_coefficients import coefficients, possible_answers
-from diagnosis.search.hypothesis import Hypothesis, RandomMoment
+from diagnosis.search.hypothesis import Hypothesis, MomentLayer
 from diagnosis.search.investigate import investigate
 from diagnosis.search.process_noise import is_of_reading, likeliest, random_moments
 from diagnosis.search.random_moments import obeys_a_law, weigh_random_moments
@@ -83,7 +83,7 @@ def of(conditions: Sequence[tuple[float, float]], *effects: Effect) -> Campaign:
     return replace(data, runs=data.runs[: len(conditions)])
 
 
-def layer(answer: Hypothesis) -> RandomMoment:
+def layer(answer: Hypothesis) -> MomentLayer:
     assert answer.moment is not None
     return answer.moment
 

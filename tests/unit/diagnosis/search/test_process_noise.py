@@ -15,7 +15,7 @@ from diagnosis.search import process_noise as pn
 from diagnosis.search import random_moments
 from diagnosis.search.evident import needed
 from diagnosis.search.grow import grow
-from diagnosis.search.hypothesis import Hypothesis, RandomMoment
+from diagnosis.search.hypothesis import Hypothesis, MomentLayer
 from diagnosis.search.process_noise import with_response
 from diagnosis.search.random_moments import excess_elsewhere, is_no_noise, obeys_a_law, weigh_random_moments
 from diagnosis.search.random_spectra import BROAD, CENTRED, STREAM, SpectrumPart, wandering
@@ -47,7 +47,7 @@ BUFFETING = (effect_class("buffeting"),)
 BOTH = (*BUFFETING, effect_class("vortex_shedding"))
 
 
-def moment_of(answer: Hypothesis) -> RandomMoment:
+def moment_of(answer: Hypothesis) -> MomentLayer:
     assert answer.moment is not None
     return answer.moment
 

@@ -13,7 +13,7 @@ from diagnosis.answer.held_out import excess_base
 from diagnosis.noise.gap import GapTest
 from diagnosis.noise.mains import Hum
 from diagnosis.search.clock import StepClock
-from diagnosis.search.hypothesis import Hypothesis, RandomMoment
+from diagnosis.search.hypothesis import Hypothesis, MomentLayer
 from diagnosis.search.prepared import HUM_LEFT
 from diagnosis.search.sets import Sets, resolved
 from diagnosis.search.study import Study, noise_explains
@@ -51,7 +51,7 @@ def weighed(study: Study, moment: Hypothesis | None = None) -> Sets:
 
 
 def shedding(share: float) -> Hypothesis:
-    layer = RandomMoment((effect_class("vortex_shedding"),), None, left(share))  # type: ignore[arg-type]
+    layer = MomentLayer((effect_class("vortex_shedding"),), None, left(share))  # type: ignore[arg-type]
     return Hypothesis((), None, moment=layer)  # type: ignore[arg-type]
 
 

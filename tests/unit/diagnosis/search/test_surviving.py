@@ -13,7 +13,7 @@ import pytest
 from diagnosis.likelihood.least_squares import Fit, fit
 from diagnosis.likelihood.without_run import WithoutRuns, refitted_without
 from diagnosis.model.parameters import Point
-from diagnosis.search.hypothesis import Hypothesis, RandomMoment
+from diagnosis.search.hypothesis import Hypothesis, MomentLayer
 from diagnosis.search.process_noise import ProcessNoise
 from diagnosis.search.sets import Sets, resolved
 from diagnosis.search.surviving import contradicted, explains_too_much, refusal, shown_by_one
@@ -108,7 +108,7 @@ def test_a_set_with_a_random_moment_is_judged_as_others_are() -> None:
     base = nominal(campaign(CUBIC, duration=6.0))
     kind = effect_class("ambient_vibration")
     names = (kind.name,)
-    layer = RandomMoment((kind,), moment(10.0 * base.total), FittedSet(names, 0.0, np.zeros(6)))
+    layer = MomentLayer((kind,), moment(10.0 * base.total), FittedSet(names, 0.0, np.zeros(6)))
     answer = Hypothesis((), base, moment=layer)
     found = resolved(Sets(whole_runs(base), (), random=(answer,)))
     assert found.random == ()
