@@ -142,20 +142,6 @@ def test_a_folder_without_a_campaign_is_one_line(tunnel: Tunnel, tmp_path: Path)
     assert "campaign.toml" in err
 
 
-def test_an_interrupted_run_leaves_no_file(
-    tunnel: Tunnel, gap_free: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def interrupted(*_: object, **__: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("diagnosis._diagnose.investigate", interrupted)
-    (tmp_path / "out").mkdir()
-    status, out, err = tunnel("diagnose", gap_free, "--json", tmp_path / "out" / "a.json")
-    assert (status, out) == (130, "")
-    assert err.count("\n") == 1
-    assert list((tmp_path / "out").iterdir()) == []
-
-
 @pytest.mark.slow
 def test_a_calm_campaign_without_held_out_runs_claims_neither_wind_nor_prediction(
     tunnel: Tunnel, tmp_path: Path

@@ -12,13 +12,12 @@ import pytest
 
 from tests.skips import PLATFORM
 from tests.support.command import Tunnel
-from tunnel_lab.show.film import Look, backends, draw_trace, shown_run, write_film
+from tunnel_lab.show.film import backends, draw_trace, shown_run
 from tunnel_lab.show.live import missing_display, view_in_window
 from tunnel_lab.show.request import Request
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
 from tunnel_sim.files.writing import as_json
-from tunnel_sim.vocabulary.errors import TunnelError
 
 PLAN = Path(__file__).parents[3] / "data" / "tiny-plan.toml"
 SMALL = ("--size", "240x160", "--duration", "0.6")
@@ -113,15 +112,6 @@ def test_film_and_picture_are_whole_where_the_machine_can_draw(tunnel: Tunnel, t
     body, trace = slice(0, 120), slice(130, 240)  # left the body, right the trace: both move
     for part in (body, trace):
         assert np.abs(frames[0][:, part].astype(int) - frames[3][:, part]).max() > 60
-
-
-def test_an_interrupted_film_leaves_nothing(tmp_path: Path) -> None:
-    def interrupt(*_: int) -> None:
-        raise KeyboardInterrupt
-
-    with pytest.raises((KeyboardInterrupt, TunnelError)):  # the latter where the machine cannot draw
-        write_film(Request(duration=0.6), Look(240, 160, fps=10), tmp_path / "film.mp4", interrupt)
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_trace_grows_to_where_the_run_is() -> None:
