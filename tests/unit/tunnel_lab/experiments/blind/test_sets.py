@@ -16,9 +16,8 @@ from tests.reference.rigs import rig
 from tests.support.gone_reader import unheard
 from tests.unit.tunnel_lab.experiments.blind.test_set_score import document
 from tunnel_lab.cli import main
-from tunnel_lab.experiments.blind import answer_set, answers_folder, make_blind, score_set, sets
+from tunnel_lab.experiments.blind import answer_set, make_blind, score_set, sets
 from tunnel_lab.experiments.blind import answers as answer
-from tunnel_lab.experiments.runner import processes
 from tunnel_reference import draw, severity
 from tunnel_reference.draw import Mixture
 from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
@@ -135,16 +134,6 @@ def test_the_same_seed_gives_the_same_campaigns_under_another_salt(made, tmp_pat
         )
 
 
-def test_an_interrupted_making_leaves_nothing(tmp_path, monkeypatch):
-    def interrupted(*_args, **_kwargs):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("tunnel_lab.experiments.blind.sets.simulate_set", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        make_blind(tmp_path / "set", count=1, seed=1)
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_campaign_that_the_reader_refuses_is_drawn_again(tmp_path, monkeypatch):
     written = []
 
@@ -172,33 +161,6 @@ def test_a_set_is_not_made_over_another(blind):
         make_blind(blind, count=1, seed=1)
 
 
-def test_answering_goes_on_where_it_was_interrupted(blind, quick, monkeypatch):
-    whole = answer.diagnose
-
-    def second_time(campaign, kinds):
-        if len(quick) == 1:
-            raise KeyboardInterrupt
-        return whole(campaign, kinds)
-
-    monkeypatch.setattr(answer, "diagnose", second_time)
-    with pytest.raises(KeyboardInterrupt):
-        answer_set(blind)
-    assert [name for name, _ in quick] == ["c0001"]
-    first = (blind / "answers" / "c0001.json").read_bytes()
-    steps = []
-    monkeypatch.setattr(answer, "diagnose", whole)
-    answer_set(blind, progress=lambda *args: steps.append(args))
-    assert [name for name, _ in quick] == ["c0001", "c0002", "c0003"]
-    assert (blind / "answers" / "c0001.json").read_bytes() == first
-    assert steps == [(1, 3), (2, 3), (3, 3)]
-    assert {p.name for p in (blind / "answers").iterdir()} == {
-        "c0001.json",
-        "c0002.json",
-        "c0003.json",
-        "seal.json",
-    }
-
-
 @pytest.mark.usefixtures("quick")
 def test_answering_never_opens_the_key(blind):
     (blind / "key.json").unlink()
@@ -215,20 +177,6 @@ def test_a_campaign_that_cannot_be_diagnosed_is_a_wrong_answer(blind, monkeypatc
     assert score.exact()["all"] == Proportion(0, 3)
     assert {name for row in score.confusion().values() for name in row} == {"no answer"}
     assert "do not help" in (blind / "answers" / "c0002.json").read_text()
-
-
-@pytest.mark.slow
-def test_processes_give_the_answers_of_one(blind, monkeypatch):
-    monkeypatch.setenv("OMP_NUM_THREADS", "1")
-    exclude = ("buffeting",)
-    alone = [
-        json.loads(answer.answer_campaign(blind / name, exclude).files["answers"])["causes"]
-        for name in ("c0001", "c0002", "c0003")
-    ]
-    answer_set(blind, excluded=exclude, workers=processes(2))
-    folder = answers_folder(blind, exclude)
-    assert folder.name == "answers-without-buffeting"
-    assert [json.loads((folder / f"c000{i}.json").read_text())["causes"] for i in (1, 2, 3)] == alone
 
 
 @pytest.mark.usefixtures("quick")
