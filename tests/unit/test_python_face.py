@@ -207,13 +207,3 @@ def test_uncertain_values_have_the_covariance(estimate: Estimate, found: Diagnos
     np.testing.assert_allclose(matrix, found.coefficients.correlation, atol=1e-9)
     assert np.all(np.abs(matrix[~np.eye(len(after), dtype=bool)]) <= 1.0)
     assert Estimate("c", "own", ()).to_uncertainties() == {}
-
-
-def test_parquet_is_read_by_pandas(found: Diagnosis, tmp_path: Path) -> None:
-    import pandas
-
-    found.to_frame().write_parquet(tmp_path / "answer.parquet")
-    assert (
-        pandas.read_parquet(tmp_path / "answer.parquet")["quantity"].tolist()
-        == found.to_frame()["quantity"].to_list()
-    )

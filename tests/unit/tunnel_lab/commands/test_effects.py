@@ -78,11 +78,6 @@ def test_a_page_of_other_effects_is_another_page() -> None:
     assert reference_page(ALL_EFFECTS) != reference_page(ALL_EFFECTS[:-1])
 
 
-def test_unknown_effect_is_one_line(tunnel: Tunnel) -> None:
-    expected = "tunnel: unknown effect 'coulomb_fricton'; did you mean 'coulomb_friction'?\n"
-    assert tunnel("effects", "coulomb_fricton") == (2, "", expected)
-
-
 @pytest.mark.parametrize("kind", ALL_EFFECTS, ids=lambda kind: kind.name)
 def test_the_example_of_each_effect_can_be_given(kind: type[Effect]) -> None:
     option, text = shlex.split(example(kind))

@@ -330,16 +330,6 @@ def test_it_draws_itself_and_prints_itself(capsys):
     assert lines[1].startswith("run 1: spring 5, 15 m/s, 10°, 5 s; Cnβ = 0.")
 
 
-def test_the_usual_wrappers_work():
-    env = gym.wrappers.RecordEpisodeStatistics(gym.wrappers.TimeLimit(make(**SHORT), 2))
-    env.reset(seed=0)
-    rewards = [env.step(OFF)[1]]
-    *_, reward, _, truncated, info = env.step(OFF)
-    assert truncated
-    assert info["episode"]["r"] == pytest.approx(rewards[0] + reward)
-    assert info["episode"]["l"] == 2
-
-
 def test_many_in_one_process_are_the_same_as_one_alone():
     many = gym.make_vec(ID, num_envs=2, vectorization_mode="sync", **SHORT)
     many.reset(seed=[3, 4])
