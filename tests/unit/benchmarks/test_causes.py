@@ -21,8 +21,7 @@ from benchmarks.causes.make import CAMPAIGNS, KEY, check, data_hash, make
 from benchmarks.causes.page import page_text
 from benchmarks.causes.tracks import EDITIONS, TRACKS, draw_all
 from tests.marks import slow
-from tests.reference.rigs import rig
-from tunnel_reference import draw, severity
+from tests.reference.rigs import short_campaigns
 from tunnel_sim.vocabulary.errors import TunnelError
 
 EXAMPLES = Path(__file__).parents[3] / "benchmarks/causes/examples"
@@ -31,10 +30,7 @@ DRAWN = {1: "43527d67c87f6eb0", 2: "b06dd1b2966296ca"}
 
 
 def made(folder, **more):
-    c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4, sample_rate=500.0)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(draw, "draw_conditions", lambda _rng: c)
-        patch.setattr(severity, "_SUBSTEPS", 2)  # the motions need not be exact
+    with short_campaigns(sample_rate=500.0):
         make(folder, seed=3, counts=COUNTS, real=False, **more)
     return folder
 
@@ -98,10 +94,7 @@ def test_the_second_version_has_runs_that_do_not_repeat():
 
 
 def scattering(folder):
-    c = rig((21.02, 67.98, 21.02), (0.0, 0.0, 25.0), (0.35,) * 3, sample_rate=250.0)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(draw, "draw_conditions", lambda _rng: c)
-        patch.setattr(severity, "_SUBSTEPS", 2)
+    with short_campaigns(runs=3):
         make(
             folder, version=2, seed=3, counts={"scatter_alone": 2, "scatter_stated": 1, "runs_that_repeat": 1}
         )
