@@ -105,10 +105,8 @@ def test_an_estimate_is_a_table_of_coefficients_or_of_runs(data: Campaign, estim
     assert alone.to_frame().equals(alone.runs_frame())
 
 
-def test_figures_and_the_report_are_those_of_the_command(
-    found: Diagnosis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("tunnel_lab.report.page.inline_svg", lambda *_: "")  # drawing takes most of the time
+@pytest.mark.usefixtures("undrawn")
+def test_figures_and_the_report_are_those_of_the_command(found: Diagnosis, tmp_path: Path) -> None:
     fit = found.plot()
     assert isinstance(fit, Figure)
     ids = [run.id for run in found.gap.runs]

@@ -8,7 +8,7 @@ from tests.support.gap_campaigns import campaign
 from tests.support.scattered_runs import SCATTERED, scattered
 from tunnel_sim.effects import effect_class
 
-KINDS = [effect_class(name) for name in (*SCATTERED, "cubic_stiffness")]
+KINDS = [effect_class(name) for name in SCATTERED]
 
 
 @pytest.mark.parametrize("scatters", [False, True])

@@ -198,10 +198,8 @@ def test_records_without_noise_are_said_to_test_the_numerics(
     assert "almost no noise" in out
 
 
-def test_the_files_are_hashed(
-    tunnel: Tunnel, gap_free: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("tunnel_lab.report.page.inline_svg", lambda *_: "")  # nearly all of the time
+@pytest.mark.usefixtures("undrawn")
+def test_the_files_are_hashed(tunnel: Tunnel, gap_free: Path, tmp_path: Path) -> None:
     author, page = "A. Smith", tmp_path / "report.html"
     words = ("--effects", "sensor_drift", "--json", tmp_path / "a.json", "--report", page, "--author", author)
     assert tunnel("diagnose", gap_free, *words)[0] == 0

@@ -328,8 +328,8 @@ def test_without_a_browser_the_pdf_is_refused(document, data, tmp_path, monkeypa
     assert not (tmp_path / "report.pdf").exists()
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_browser_that_fails_leaves_no_file(document, data, tmp_path, monkeypatch):
-    monkeypatch.setattr("tunnel_lab.report.page.inline_svg", lambda *_: "")
     monkeypatch.setattr("tunnel_lab.report.page.find_browser", lambda: "false")
     with pytest.raises(TunnelError, match="Chromium could not print"):
         write_pdf(findings_of(document | {"maps": None}), data, tmp_path / "report.pdf")
