@@ -131,30 +131,6 @@ def test_effects_are_added_to_the_plans(tunnel: Tunnel, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("effects", "part"),
-    [
-        (["coulomb_fricton:friction_moment=0.1"], "did you mean 'coulomb_friction'?"),
-        (["coulomb_friction:friction=0.1"], "did you mean 'friction_moment'?"),
-        (["coulomb_friction:friction_moment=nan"], "nan is out of range"),
-        (["coulomb_friction:friction_moment=-1"], "-1.0 is out of range"),
-        (["coulomb_friction"], "friction_moment is missing"),
-        ([FRICTION, FRICTION], "given twice"),
-        (["coulomb_friction:0.1"], "is not PARAMETER=VALUE"),
-        (["spring_miscalibration:error=0.1,spring_stiffness=1"], "no run has a spring_stiffness of 1"),
-    ],
-)
-def test_bad_effects_are_one_line_and_leave_nothing(
-    tunnel: Tunnel, tmp_path: Path, effects: list[str], part: str
-) -> None:
-    options = [word for effect in effects for word in ("--effect", effect)]
-    status, out, err = tunnel("simulate", PLAN, "--out", tmp_path / "c", *options)
-    assert (status, out) == (2, "")
-    assert err.count("\n") == 1
-    assert part in err
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(
     "kind", [kind for kind in ALL_EFFECTS if not kind.fitted], ids=lambda kind: kind.name
 )
 def test_a_check_does_not_compare_the_motion_of_an_effect_that_no_fit_finds(

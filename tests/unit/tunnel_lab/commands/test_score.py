@@ -163,29 +163,6 @@ def test_a_new_estimator_is_said_to_be_unchecked(tunnel: Tunnel, baseline: Path)
     assert "not checked: conventional" in out
 
 
-@pytest.mark.parametrize(
-    ("arguments", "parts"),
-    [
-        (["--estimator", "matrix_pencl"], ["did you mean 'matrix_pencil'"]),
-        (["--check", "none.parquet"], ["none.parquet", "no such file"]),
-        (["missing.toml"], ["missing.toml", "no such file"]),
-        (["--write-baseline", "no/such/folder.parquet"], ["folder"]),
-        (["--breakdown", "--check", "packaged"], ["--check", "cannot be combined with --breakdown"]),
-        (["--trials", "1"], ["--trials"]),
-        (["--jobs", "-1"], ["--jobs"]),
-    ],
-)
-def test_bad_input_is_one_line_and_leaves_nothing(
-    tunnel: Tunnel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], parts: list[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    status, out, err = tunnel("score", *arguments)
-    assert (status, out, err.count("\n")) == (2, "", 1)
-    for part in parts:
-        assert part in err
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_baseline_of_other_cells_or_of_a_vanished_estimator_is_refused(
     tunnel: Tunnel, grid: Path, baseline: Path, tmp_path: Path
 ) -> None:
