@@ -86,6 +86,25 @@ effects --markdown e.json | e.json | .md
 score --write-baseline b.csv | b.csv | .parquet
 schema plan --out s.toml | s.toml | .json
 render --out film.gif | film.gif | .mp4
+view --spring 99 | there is no spring 99
+view --wind nan | --wind
+view tiny.toml --run nonsense | has no run 'nonsense'
+view --camera behind | there is no camera 'behind'
+render --out a.mp4 --spring 99 | there is no spring 99
+render --out a.mp4 --wind -1 | --wind
+render --out a.mp4 --angle 90 | --angle
+render --out a.mp4 --duration 0 | --duration
+render --out a.mp4 --run x | there is no plan
+render nowhere.toml --out a.mp4 | nowhere.toml
+render --out a.mp4 --effect coulomb_frictoin:friction_moment=1 | did you mean 'coulomb_friction'
+render --out a.mp4 --effect coulomb_friction | friction_moment is missing
+render --out nowhere/a.mp4 | its folder does not exist
+render --out a.png --size 100x100 | --size
+render --out a.png --size big | --size
+render --out a.png --size 321x240 | --size
+render --out a.png --at 99 | 99 s is not in the run
+render --out a.png --fps 0 | fps
+paper --out p --only table-5 | no part 'table-5'
 train weights.bin | weights.bin | .safetensors
 """
 

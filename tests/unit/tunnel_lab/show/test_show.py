@@ -23,56 +23,6 @@ PLAN = Path(__file__).parents[3] / "data" / "tiny-plan.toml"
 SMALL = ("--size", "240x160", "--duration", "0.6")
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (("--spring", "99"), "there is no spring 99"),
-        (("--wind", "-1"), "--wind"),
-        (("--wind", "nan"), "--wind"),
-        (("--angle", "90"), "--angle"),
-        (("--duration", "0"), "--duration"),
-        (("--run", "x"), "there is no plan"),
-        ((PLAN, "--run", "nonsense"), "has no run 'nonsense'"),
-        (("nowhere.toml",), "nowhere.toml"),
-        (("--effect", "coulomb_frictoin:friction_moment=1"), "did you mean 'coulomb_friction'"),
-        (("--effect", "coulomb_friction"), "friction_moment is missing"),
-        (("--camera", "behind"), "there is no camera 'behind'"),
-    ],
-)
-@pytest.mark.parametrize("command", ["view", "render"])
-def test_bad_input_is_one_clear_line(
-    command: str, arguments: tuple[str, ...], said: str, tunnel: Tunnel, tmp_path: Path, monkeypatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    out = ("--out", "film.mp4") if command == "render" else ()
-    status, _, error = tunnel(command, *arguments, *out)
-    assert status == 2
-    assert said in error
-    assert error.count("\n") == 1
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (("--out", "film.gif"), "neither .mp4 nor .png"),
-        (("--out", "nowhere/film.mp4"), "its folder does not exist"),
-        (("--out", "a.png", "--size", "100x100"), "--size"),
-        (("--out", "a.png", "--size", "big"), "--size"),
-        (("--out", "a.png", "--size", "321x240"), "--size"),
-        (("--out", "a.png", "--at", "99"), "99 s is not in the run"),
-        (("--out", "a.png", "--fps", "0"), "fps"),
-    ],
-)
-def test_render_refuses(arguments, said, tunnel: Tunnel, tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    status, _, error = tunnel("render", *arguments)
-    assert status == 2
-    assert said in error
-    assert error.count("\n") == 1
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_machine_that_cannot_draw_is_told_what_to_install(
     tunnel: Tunnel, tmp_path: Path, monkeypatch
 ) -> None:
