@@ -238,3 +238,13 @@ def test_the_answer_says_which_runs_rest_for_long():
     found = diagnose(stopped(), kinds=[effect_class("coulomb_friction")])
     assert found.causes == ("coulomb_friction",)
     assert any("at rest at the end of r3, r6" in caution for caution in found.cautions)
+
+
+def test_rests_stay_where_the_rest_of_the_runs_cannot_be_fitted(monkeypatch):
+    monkeypatch.setattr("diagnosis.search.views.whole_runs.try_fit", lambda *_: None)
+    fitted = nominal(stopped())
+    monkeypatch.setattr("diagnosis.search.prepared.fit_nominal", lambda _data: fitted)
+    found = investigate(stopped(), [effect_class("coulomb_friction")])
+    assert found.prepared.rested == ()
+    assert [run.fine.reading.size for run in found.nominal.problem.data.runs] == [3000] * 6
+    assert found.causes == ("coulomb_friction",)

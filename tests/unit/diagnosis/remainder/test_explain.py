@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -28,7 +29,7 @@ from diagnosis.likelihood.residuals import linear_coefficients
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.remainder import ways
 from diagnosis.remainder.explain import chosen_kind, closable, steady_line
-from diagnosis.remainder.formula import Formula, FormulaTerm, effect_of, effect_table, terms
+from diagnosis.remainder.formula import Formula, FormulaTerm, choose, effect_of, effect_table, terms
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import investigate
 from diagnosis.settings import Settings
@@ -332,6 +333,38 @@ def test_responses_along_the_path_are_the_fits_own_sensitivities_where_the_model
         found, expected = (values - path.release @ (path.release.T @ values) for values in both)
         for one, other in zip(found.T, expected.T, strict=True):
             assert np.linalg.norm(one - other) <= limit * np.linalg.norm(other)
+
+
+@pytest.mark.parametrize(
+    ("kind", "own", "wider", "chosen"),
+    [
+        (
+            "angle",
+            9.9,
+            20.0,
+            "own",
+        ),  # it reaches nearly all that its kind closes: no terms of the state are tried
+        ("angle", 3.0, 4.0, "wider"),
+        ("rate", 3.0, 3.0, "own"),
+        ("rate", 3.0, 2.0, "own"),
+        ("angle", 3.0, None, "own"),
+        ("angle", None, 4.0, "wider"),
+        ("angle", None, None, None),
+        ("time", 3.0, 4.0, "own"),
+    ],
+)
+def test_terms_of_the_state_are_taken_where_those_of_angle_or_rate_close_less(
+    monkeypatch, kind, own, wider, chosen
+):
+    found = {kind: own, "state": wider}
+    formulas = {
+        name: None if gained is None else Formula((), (), False, np.zeros(0), gained)
+        for name, gained in found.items()
+    }
+    monkeypatch.setattr("diagnosis.remainder.formula._chosen", lambda _, of, __: formulas[of])
+    expected = {"own": formulas[kind], "wider": formulas["state"], None: None}[chosen]
+    unexplained = SimpleNamespace(fit=SimpleNamespace(settings=Settings()))
+    assert choose(unexplained, kind, 10.0) is expected
 
 
 def test_the_share_closed_is_a_ratio_of_sums_with_its_standard_error():
