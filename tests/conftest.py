@@ -73,3 +73,11 @@ def causes_alone(monkeypatch: pytest.MonkeyPatch) -> None:
 
     for search in ("closable", "closable_driven"):
         monkeypatch.setattr(ways, search, lambda *_, **__: None)
+
+
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reports without pictures: drawing takes most of the time, and has tests of its own."""
+    from tunnel_lab.report import page
+
+    monkeypatch.setattr(page, "inline_svg", lambda *_: "")

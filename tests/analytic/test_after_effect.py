@@ -12,7 +12,6 @@ from scipy.integrate import solve_ivp
 from tests.analytic.law_cases import RIG
 from tests.support.acting import acting
 from tunnel_sim.effects import effect_from
-from tunnel_sim.engine.simulate import simulate_motions
 from tunnel_sim.physics.forward import forward_motion
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.plan import AeroDerivatives
@@ -79,9 +78,3 @@ def test_the_centre_creeps_as_with_elements_of_all_relaxation_times():
 def test_it_is_in_proportion_to_the_release():
     one, other = (modelled(1.0, sign * RELEASE) for sign in (1.0, -1.0))
     np.testing.assert_allclose(one, -other, atol=1e-12)
-
-
-def test_mujoco_integrates_the_same():
-    (found,) = simulate_motions(RIG, [settings(1.0)], RATE)
-    np.testing.assert_allclose(found.angle, modelled(1.0), atol=1e-8)
-    assert np.max(np.abs(found.angle - modelled(0.0))) > 1e-3

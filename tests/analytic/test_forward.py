@@ -14,7 +14,7 @@ from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
 from tunnel_sim.physics.forward import backlash, forward_motion, forward_run, integrate
 from tunnel_sim.physics.moment_law import parameter_vector
-from tunnel_sim.physics.run_settings import RodTwist, RunSettings, Series
+from tunnel_sim.physics.run_settings import RodTwist, RunSettings
 from tunnel_sim.physics.steps import compensated
 
 
@@ -42,36 +42,6 @@ def test_rate_is_that_of_the_model() -> None:
     settings = replace(Case("", {"aero_lag": 2.0}, twist=RodTwist(2e-3, 0.3)).settings(), release_rate=0.5)
     model = simulate_motion(build_model(RIG, settings), SAMPLE_RATE)
     assert np.max(np.abs(model.rate - forward_motion(RIG, settings, SAMPLE_RATE).rate)) < 1e-11
-
-
-def test_a_batch_of_runs_equals_the_runs_one_by_one() -> None:
-    settings = [case.settings() for case in CASES[:6]]
-    prepared = [forward_run(one) for one in settings]
-    runs = np.concatenate([run for run, _ in prepared])
-    law = np.array([parameter_vector(one.law(RIG)) for one in settings])
-    angle, rate, status = integrate(law, runs, 2000)
-    assert status == 0
-    for i, one in enumerate(settings):
-        alone = forward_motion(RIG, replace(one, duration=2.0), SAMPLE_RATE)
-        assert np.array_equal(angle[i], alone.angle)
-        assert np.array_equal(rate[i], alone.rate)
-
-
-def test_runs_side_by_side_move_as_runs_alone() -> None:
-    # by the functions that the plugin calls; elementary ones differ by the last digits
-    settings = [one for case in CASES if (one := case.settings()).rod_twist is None and not one.series]
-    sampled = [replace(one, series={**one.series, "forcing": Series((0.0,), 1.0)}) for one in settings]
-    law = np.array([parameter_vector(one.law(RIG)) for one in settings])
-    for stride in (1, 3):
-        found = []
-        for kind in (settings, sampled):
-            prepared = [forward_run(one) for one in kind]
-            runs = np.concatenate([run for run, _ in prepared])
-            runs["step"], runs["stride"] = 4e-3 / stride, stride
-            found.append(integrate(law, runs, 1000))
-        assert found[0][2] == found[1][2] == 0
-        np.testing.assert_allclose(found[0][0], found[1][0], rtol=1e-12, atol=1e-13)
-        np.testing.assert_allclose(found[0][1], found[1][1], rtol=1e-12, atol=1e-12)
 
 
 def test_a_run_that_grows_without_bound_is_named() -> None:

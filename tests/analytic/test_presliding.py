@@ -15,7 +15,7 @@ from tests.reference.effect_oracle import Setting, reading
 from tests.support.acting import acting
 from tunnel_sim.effects import EffectChain, effect_from
 from tunnel_sim.engine.model import Model, build_model
-from tunnel_sim.engine.simulate import simulate_motion, simulate_motions
+from tunnel_sim.engine.simulate import simulate_motion
 from tunnel_sim.physics.forward import forward_motion
 from tunnel_sim.physics.moment_law import state_names
 from tunnel_sim.physics.run_settings import RunSettings
@@ -123,15 +123,6 @@ def test_a_range_too_short_for_the_step_stays_stable(reach: float, step: float) 
     angle, coulomb = (forward_motion(RIG, run, SAMPLE_RATE).angle for run in (yielding, rigid))
     assert np.max(np.abs(angle - coulomb)) < 2e-3
     assert np.ptp(angle[-500:]) < 2e-5
-
-
-def test_threads_and_batches_give_the_same_bits() -> None:
-    friction = effect_from("coulomb_friction", {"friction_moment": 0.03, "presliding": 0.004})
-    runs = [replace(settings(Setting(spring=k)), duration=0.5) for k in (16.12, 44.84, 67.98)]
-    true = [acting(friction, run) for run in runs]
-    first, *rest = (simulate_motions(RIG, true, 1000.0, nthread=n) for n in (1, 2, 3))
-    for others in rest:
-        assert all(np.array_equal(a.angle, b.angle) for a, b in zip(first, others, strict=True))
 
 
 @pytest.mark.parametrize("reverse", [False, True])

@@ -15,7 +15,7 @@ from tunnel_sim.engine.simulate import simulate, simulate_motions
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_motion
 from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.physics.steps import BODY_TURN, FREQUENCY_ERROR, follow_fastest
+from tunnel_sim.physics.steps import BODY_TURN, FREQUENCY_ERROR
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import (
     AeroDerivatives,
@@ -88,13 +88,3 @@ def test_a_rate_for_which_no_step_is_short_enough_is_refused_in_one_line() -> No
         simulate_motions(RIG, [PLAIN, replace(PLAIN, spring_stiffness=1e9)], 1000.0)
     assert "\n" not in str(no.value)
     assert "spring_stiffness" in str(no.value)
-
-
-def test_batch_and_single_run_take_the_same_steps() -> None:
-    run = replace(PLAIN, spring_stiffness=5e4, duration=0.5)
-    quiet = SensorModel(1000.0, 0.0, 0.0)
-    alone = simulate(RIG, run, quiet, np.random.default_rng(0))
-    (other,) = simulate_motions(RIG, [run], 1000.0)
-    forward = forward_motion(RIG, follow_fastest(RIG, run), 1000.0)
-    assert np.array_equal(alone.yaw_rad, other.angle)
-    assert np.max(np.abs(forward.angle - other.angle)) < 1e-9

@@ -102,11 +102,17 @@ VARIANTS: list[tuple[str, dict[str, float], Setting]] = [
     ("damping_scatter", {"spread": 0.1}, replace(RUN, speed=0.0)),
 ]
 SHORT_STEPS = {"coulomb_friction-0.5", "rod_flexibility-0.0005", "rod_flexibility-1e-05"}  # take long
+SIBLINGS = {  # of the other sign, which the same line of the law gives
+    "quadratic_damping--0.002", "asymmetric_stiffness--0.5", "nonlinear_yaw_moment--3", "wind_speed_drift--0.2",
+    "nonlinear_yaw_damping--20", "sensor_nonlinearity--0.2", "sensor_drift--0.01", "wind_speed_offset--1.5",
+}  # fmt: skip
 
 
 def _variant(name: str, values: dict[str, float], run: Setting) -> ParameterSet:
     case = f"{name}-{next(iter(values.values())):g}"
-    return pytest.param(name, values, run, id=case, marks=[pytest.mark.slow] * (case in SHORT_STEPS))
+    return pytest.param(
+        name, values, run, id=case, marks=[pytest.mark.slow] * (case in SHORT_STEPS | SIBLINGS)
+    )
 
 
 each_variant = pytest.mark.parametrize(("name", "values", "run"), [_variant(*one) for one in VARIANTS])

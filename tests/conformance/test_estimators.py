@@ -52,14 +52,9 @@ def examined_once():
 whole_campaign = cache(campaign)
 
 
-@cache
-def clean_campaign(**options):
-    """Six runs without noise."""
-    return campaign(TWELVE[:6], rate=500.0, **options)
-
-
-def noisy_campaign():
-    return campaign(TWELVE[:6], noise=5e-4, resolution=RESOLUTION, rate=500.0, rng=np.random.default_rng(11))
+def noisy_campaign(**options):
+    rng = np.random.default_rng(11)
+    return campaign(TWELVE[:6], noise=5e-4, resolution=RESOLUTION, rate=500.0, rng=rng, **options)
 
 
 @pytest.fixture(scope="module")
@@ -288,6 +283,9 @@ PARTIAL = {
 }
 
 
+QUICK = ("wind-off only", "no size", "no stiffness", "some without stiffness")
+
+
 @cache
 def partial_campaign(case):
     settings, options, *_ = PARTIAL[case]
@@ -295,7 +293,7 @@ def partial_campaign(case):
 
 
 @each_estimator
-@pytest.mark.parametrize("case", PARTIAL)
+@pytest.mark.parametrize("case", [case if case in QUICK else slow(case) for case in PARTIAL])
 def test_partial_campaigns_give_what_they_can_and_say_the_rest(name, case):
     _, _, status, expected = PARTIAL[case]
     data = partial_campaign(case)
@@ -312,9 +310,9 @@ def test_partial_campaigns_give_what_they_can_and_say_the_rest(name, case):
 
 
 @each_estimator
-def test_without_size_the_air_is_dimensional(name):
-    estimate = identify(clean_campaign(has_size=False), name)
-    sized = identify(clean_campaign(), name)
+def test_without_size_the_air_is_dimensional(name, of_noisy):
+    estimate = identify(noisy_campaign(has_size=False), name)
+    sized = of_noisy(name)
     assert estimate.cn_beta is None
     assert estimate.cn_r is None
     for run, with_size in zip(estimate.runs, sized.runs, strict=True):
@@ -336,7 +334,7 @@ def without_a_decay(kind):
 
 
 @each_estimator
-@pytest.mark.parametrize("kind", ["constant", "noise"])
+@pytest.mark.parametrize("kind", [slow("constant"), "noise"])
 def test_records_without_a_decay_fail_with_a_remedy(name, kind):
     dead = without_a_decay(kind)
     with pytest.raises(TunnelError, match="no run could be identified; check"):

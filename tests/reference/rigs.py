@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
+from tunnel_reference import draw, severity
 from tunnel_reference.true_conditions import TrueConditions
 
 
@@ -30,3 +34,14 @@ def rig(
         speed_offset=np.zeros(n),
     )
     return replace(base, **changes)
+
+
+@contextmanager
+def short_campaigns(*, runs: int = 4, sample_rate: float = 250.0) -> Iterator[None]:
+    """Draw every campaign with these few runs of 2 s, so that a set is made quickly; the motions are not exact."""
+    conditions = ((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4)
+    drawn = rig(*(values[:runs] for values in conditions), sample_rate=sample_rate)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(draw, "draw_conditions", lambda _rng: drawn)
+        patch.setattr(severity, "_SUBSTEPS", 2)
+        yield

@@ -105,10 +105,8 @@ def test_an_estimate_is_a_table_of_coefficients_or_of_runs(data: Campaign, estim
     assert alone.to_frame().equals(alone.runs_frame())
 
 
-def test_figures_and_the_report_are_those_of_the_command(
-    found: Diagnosis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("tunnel_lab.report.page.inline_svg", lambda *_: "")  # drawing takes most of the time
+@pytest.mark.usefixtures("undrawn")
+def test_figures_and_the_report_are_those_of_the_command(found: Diagnosis, tmp_path: Path) -> None:
     fit = found.plot()
     assert isinstance(fit, Figure)
     ids = [run.id for run in found.gap.runs]
@@ -207,13 +205,3 @@ def test_uncertain_values_have_the_covariance(estimate: Estimate, found: Diagnos
     np.testing.assert_allclose(matrix, found.coefficients.correlation, atol=1e-9)
     assert np.all(np.abs(matrix[~np.eye(len(after), dtype=bool)]) <= 1.0)
     assert Estimate("c", "own", ()).to_uncertainties() == {}
-
-
-def test_parquet_is_read_by_pandas(found: Diagnosis, tmp_path: Path) -> None:
-    import pandas
-
-    found.to_frame().write_parquet(tmp_path / "answer.parquet")
-    assert (
-        pandas.read_parquet(tmp_path / "answer.parquet")["quantity"].tolist()
-        == found.to_frame()["quantity"].to_list()
-    )

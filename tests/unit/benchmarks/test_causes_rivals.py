@@ -21,8 +21,7 @@ from benchmarks.causes.neural_training import (
     trained,
 )
 from benchmarks.causes.summaries import mirrored, summaries
-from tests.reference.rigs import rig
-from tunnel_reference import draw, severity
+from tests.reference.rigs import short_campaigns
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -30,10 +29,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 @pytest.fixture(scope="module")
 def training(tmp_path_factory):
     folder = tmp_path_factory.mktemp("training")
-    c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4, sample_rate=250.0)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(draw, "draw_conditions", lambda _rng: c)
-        patch.setattr(severity, "_SUBSTEPS", 2)  # the motions need not be exact
+    with short_campaigns():
         seconds = make_campaigns(folder, 2, chunk=1)
     return folder, seconds
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.golden import changes, main, normalised
+from benchmarks.golden import main, normalised
 
 
 def test_seconds_versions_and_hashes_are_left_out_and_settings_kept():
@@ -49,7 +49,3 @@ def test_a_folder_that_is_not_there_is_refused_and_not_made(what, missing, tmp_p
     assert stopped.value.code == 2
     assert "none: no " in capsys.readouterr().err
     assert not (tmp_path / "none").exists()
-
-
-def test_a_change_in_a_long_line_is_shown_from_shortly_before_it():
-    assert changes(["x" * 500 + "a"], ["x" * 500 + "b"]) == [f"- {'x' * 40}a", f"+ {'x' * 40}b"]

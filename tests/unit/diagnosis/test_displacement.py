@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from diagnosis import diagnose
+from diagnosis import diagnose, vocabulary
 from diagnosis.findings.sections import sections
 from diagnosis.model.carriage import Carriage
 from diagnosis.result import Diagnosis
@@ -187,7 +187,10 @@ def test_an_angle_and_its_twin_have_the_same_numbers(quantity: Quantity) -> None
 def test_the_size_of_the_motion_changes_no_digit() -> None:
     """A motion of 1/1024 has the same answer, and every number is multiplied by a power of 1024."""
     usual = linear_campaign(2.0, (3.0, 5.0), (0.3, 0.15), square)
-    large, small = (dict(numbers(diagnose(one).to_json_dict())) for one in (usual, scaled(usual, 2.0**-10)))
+    few = vocabulary(["coulomb_friction", "cubic_stiffness", "quadratic_damping", "sensor_drift"])
+    large, small = (
+        dict(numbers(diagnose(one, kinds=few).to_json_dict())) for one in (usual, scaled(usual, 2.0**-10))
+    )
     assert large.keys() == small.keys()
     powers = {
         place: np.log2(abs(large[place] / small[place])) / 10.0

@@ -72,35 +72,6 @@ def test_the_package_runs_as_a_module_from_the_tree() -> None:
     assert done.stdout == f"tunnel {version('virtual-wind-tunnel')}\n"
 
 
-@pytest.mark.parametrize(
-    ("arguments", "parts"),
-    [
-        (["identfy"], ["No such command 'identfy'", "identify"]),
-        (["identify"], ["Missing argument"]),
-        (["springs", "--colour"], ["No such option", "--colour"]),
-        (["simulate", "plan.toml"], ["Missing option", "--out"]),
-        (["simulate", "plan.toml", "--out", "x", "--file-format", "xls"], ["xls", "parquet", "csv"]),
-        (["simulate", "plan.toml", "--out", "x", "--seed", "-1"], ["--seed"]),
-        (["simulate", "plan.toml", "--out", "x", "--seed", "one"], ["--seed"]),
-        (["springs", "one.csv", "two.csv"], ["two.csv"]),
-        (["springs", "missing.csv"], ["missing.csv", "no such file"]),
-        (["identify", "missing"], ["missing", "no such folder"]),
-        (["plot", "missing"], ["missing", "no such folder"]),
-        (["simulate", "missing.toml", "--out", "x"], ["missing.toml"]),
-        (
-            ["identify", "missing", "--estimator", "output_eror"],
-            ["output_eror", "did you mean 'output_error'"],
-        ),
-    ],
-)
-def test_bad_input_is_one_line_and_status_two(
-    tunnel: Tunnel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], parts: list[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert_refused(tunnel(*arguments), *parts)
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_message_of_several_lines_becomes_one(tunnel: Tunnel, monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object) -> None:
         raise TunnelError("two\nlines", where="here", remedy="join\n\n them")

@@ -101,7 +101,7 @@ def named():
     return diagnose(campaign(QUADRATIC), kinds=FEW, progress=steps.append), steps
 
 
-_LONG = ("pair", "hum only", "hum and an effect", "normalised, named")
+_LONG = ("pair", "hum only", "hum and an effect", "coarse step only", "normalised, named")
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis import diagnose
+from diagnosis import diagnose, vocabulary
 from diagnosis.findings.by_run import AGREE_RATE, CausesByRun, sizes
 from diagnosis.findings.sections import sections
 from diagnosis.likelihood.least_squares import Fit, fit
@@ -22,6 +22,7 @@ from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
 from tunnel_sim.vocabulary.campaign import Campaign
 
 SIZE = 0.3
+FEW = vocabulary(["cubic_stiffness", "quadratic_damping", "coulomb_friction"])
 CUBIC, DOUBLE = (effect_from("cubic_stiffness", {"coefficient": factor * SIZE}) for factor in (1.0, 2.0))
 
 
@@ -80,7 +81,7 @@ def test_what_only_the_comparison_of_runs_shows_is_said_with_the_others_held() -
 
 @pytest.fixture(scope="module")
 def answer() -> Diagnosis:
-    return diagnose(campaign(CUBIC, duration=6.0))
+    return diagnose(campaign(CUBIC, duration=6.0), kinds=FEW)
 
 
 def test_the_finding_is_said_drawn_and_read_back(answer: Diagnosis) -> None:
@@ -97,7 +98,7 @@ def test_the_finding_is_said_drawn_and_read_back(answer: Diagnosis) -> None:
 
 
 def test_nothing_is_said_where_nothing_is_named() -> None:
-    assert diagnose(campaign(duration=6.0)).by_run is None
+    assert diagnose(campaign(duration=6.0), kinds=FEW).by_run is None
 
 
 def test_a_run_of_another_size_is_said_to_differ(answer: Diagnosis) -> None:

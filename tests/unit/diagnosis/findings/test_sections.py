@@ -214,14 +214,6 @@ def test_answers_weighed(given: Document, answer: Answer) -> None:
         assert_shows(re.sub(r"rad²|s²", "", shown), wanted)
 
 
-def test_a_coefficient_that_is_not_determined_has_no_interval(given: Document) -> None:
-    after = {"cn_beta": {"value": 1.0, "std": None, "unit": "1/rad", "determined": False}}
-    row = tables.coefficients_table(
-        findings_of(given | {"coefficients": given["coefficients"] | {"after": after}})
-    ).rows[0]
-    assert row[2:4] == ("not determined by these runs", "–")
-
-
 def test_a_p_value_is_never_zero(given: Document) -> None:
     none = given | {"gap": given["gap"] | {"tests": {"white": 0.0}}}
     assert row([tables.tests_table(findings_of(none))], "white") == "– ; < 1e-300"

@@ -207,12 +207,10 @@ def test_noise_and_confirmation(given: Document) -> None:
     assert model_line(findings_of(given)) == ""
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_what_trades_off_is_said_with_its_correlation_and_the_run_that_would_separate_it(
-    given: Document, monkeypatch: pytest.MonkeyPatch
+    given: Document,
 ) -> None:
-    monkeypatch.setattr(
-        "tunnel_lab.report.page.inline_svg", lambda *_: ""
-    )  # drawing takes nearly all of the time
     names = ["mechanical_damping", "coulomb_friction.friction_moment"]
     given["trade_off"] = {"parameters": names, "correlation": -0.976, "remedy": "drive it slower"}
     line = (

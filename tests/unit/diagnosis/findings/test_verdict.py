@@ -250,8 +250,8 @@ def test_an_undecided_answer_is_undecided_on_every_page():
     assert parameters_table(findings_of(given)).title.startswith("Parameters of the most probable answer")
 
 
-def test_titles_and_order_agree_with_the_probabilities_where_an_unknown_cause_is_more_probable(monkeypatch):
-    monkeypatch.setattr("tunnel_lab.report.page.inline_svg", lambda *_: "")  # pictures are not read
+@pytest.mark.usefixtures("undrawn")
+def test_titles_and_order_agree_with_the_probabilities_where_an_unknown_cause_is_more_probable():
     given = document()
     for one, value in zip(given["candidates"], (0.33, 0.12, 0.48, 0.07), strict=False):
         one["probability"] = value

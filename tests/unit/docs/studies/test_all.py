@@ -13,7 +13,7 @@ import pytest
 
 from docs.studies import all as studies
 from docs.studies.all import PAGES, ResultPage, Step, Work, main, make
-from docs.studies.page_text import made_on, replaced, stamped
+from docs.studies.page_text import made_on
 from tunnel_sim.vocabulary.errors import TunnelError
 
 DOCS = Path(__file__).parents[4] / "docs"
@@ -45,17 +45,6 @@ def test_every_command_names_a_module_or_a_command_of_this_project() -> None:
                 assert f"<!-- {step.table} -->\n" in page.path.read_text("utf-8"), step
 
 
-def test_the_list_runs_nothing(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    assert main(["--list", "blind-check", "--work", str(tmp_path / "none"), "--seed", "7"]) == 0
-    printed = capsys.readouterr().out
-    assert printed.startswith(
-        f"blind-check: {made_on((DOCS / 'blind-check.md').read_text('utf-8'))}, about 80 min\n"
-    )
-    assert "--seed 7 " in printed
-    assert printed.endswith("Stated processor time together: 1.3 h\n")
-    assert not (tmp_path / "none").exists()
-
-
 def test_an_interrupted_study_continues_with_the_unfinished_command(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -78,18 +67,6 @@ def test_an_interrupted_study_continues_with_the_unfinished_command(
     assert made_on(text) == f"{today.day} {today:%B %Y}"
     with pytest.raises(TunnelError, match="another state of the code"):
         make(page, Work(tmp_path, code="b"), given)
-
-
-def test_a_page_has_one_stamp_after_its_title() -> None:
-    once = stamped(WRITTEN, "waves", date(2026, 11, 3), 12.4)
-    line = "*Figures of 3 November 2026. `python -m docs.studies.all waves` makes them again, in about 12 minutes"
-    assert once.startswith(f"# Waves\n\n{line}")
-    twice = stamped(once, "waves", date(2026, 12, 4), 12.4)
-    assert twice == once.replace("3 November", "4 December")
-
-
-def test_a_table_is_replaced_at_its_mark() -> None:
-    assert replaced(WRITTEN, "heights", "new") == WRITTEN.replace("old", "new")
 
 
 def test_unknown_pages_and_missing_data_are_refused(capsys: pytest.CaptureFixture[str]) -> None:

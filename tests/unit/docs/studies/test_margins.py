@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import sys
-
 import numpy as np
 import pytest
 from scipy.special import chdtri
 
 from diagnosis import Settings
-from docs.studies.margins import Watched, main, table, watched
+from docs.studies.margins import Watched, watched
 
 
 def number(value=4.0, name="C"):
@@ -51,23 +49,3 @@ def test_every_setting_that_is_not_whole_is_watched():
     assert settings == Settings()
     whole = {name for name, value in settings.values().items() if not isinstance(value, Watched)}
     assert whole == {name for name, value in Settings().values().items() if isinstance(value, int)}
-
-
-def test_campaigns_counted_before_are_not_diagnosed_again(tmp_path):
-    for name in ("a", "b"):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "campaign.toml").touch()
-    counted = {
-        str(tmp_path / "a"): {"weighing.leak": [7, 0, 2]},
-        str(tmp_path / "b"): {"weighing.leak": [3, 1, 0]},
-    }
-    assert "| `weighing.leak` | 10 | 1 | 1 | 2 | 1 |" in table([tmp_path], 10, counted)
-
-
-def test_counts_that_cannot_be_read_are_refused_in_one_line(tmp_path, monkeypatch, capsys):
-    (tmp_path / "campaign.toml").touch()
-    (tmp_path / "counts.json").write_text("{", "utf-8")
-    monkeypatch.setattr(sys, "argv", ["margins", str(tmp_path), "--kept", str(tmp_path / "counts.json")])
-    with pytest.raises(SystemExit, match="2"):
-        main()
-    assert "cannot read the counts in" in capsys.readouterr().err

@@ -13,12 +13,10 @@ from docs.studies import policies
 from docs.studies.campaign_policies import (
     CONTESTS,
     SEEDS,
-    Row,
     fill,
     from_csv,
     median_interval,
     play,
-    to_csv,
 )
 from docs.studies.policies import best_rivals, expected_gain, greedy, run_campaign, scripted, separating
 from tunnel_lab.envs.campaign import CampaignEnv
@@ -152,11 +150,6 @@ def test_the_table_of_episodes_is_complete():
     }
     assert all(count >= 50 for count in SEEDS.values())
     assert not any(row.on_first for row in rows() if row.preset == "identification")
-
-
-def test_rows_survive_their_file():
-    row = Row("diagnosis", "scripted", 3, 4, 1120.0, True, False, True, 0.25, -1.5)
-    assert from_csv(to_csv([row])) == [row]
 
 
 @pytest.mark.slow

@@ -204,7 +204,7 @@ def test_both_commands_go_on_from_the_same_release():
     free = run("r", 16.0, 0.0)
     held = np.concatenate([np.full(1500, free.record.yaw_rad[0]), free.record.yaw_rad])
     data = campaign([reading(free, held)])
-    estimate, answer = identify(data), diagnose(data)
+    estimate, answer = identify(data), diagnose(data, kinds=vocabulary(["cubic_stiffness", "sensor_drift"]))
     assert estimate.remarks == answer.remarks
     assert "release found at 3.00" in estimate.remarks[0].what
     assert estimate.runs[0].zeta.value == pytest.approx(

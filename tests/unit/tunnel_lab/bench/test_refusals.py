@@ -16,10 +16,8 @@ import pytest
 
 from tests.support.import_files import decay
 from tests.support.served import Bench, bench
-from tunnel_lab.bench.uploads import keep
 from tunnel_lab.bench.workspace import Session
-from tunnel_sim.files import import_records, writing
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.files import import_records
 
 ROWS = "\n".join(f"{t:.3f},{y:.6f}" for t, y in zip(*decay(1), strict=True))
 LOG = f"time_s,yaw_rad\n{ROWS}\n".encode()
@@ -210,19 +208,3 @@ def test_a_workspace_that_is_gone_is_said(tmp_path: Path) -> None:
         status, page = asked(served, "/")
         assert (status, "the folder cannot be read" in page) == (409, True)
         assert upload(served, [(b"a.csv", LOG)])[0] == 409
-
-
-def test_no_file_is_kept_where_one_cannot_be(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    session, write = Session(tmp_path, "rig"), writing._write_to
-
-    def refuse(descriptor: int, content: bytes) -> None:
-        write(descriptor, content)
-        if content == b"2":
-            raise PermissionError(13, "Permission denied")
-
-    monkeypatch.setattr(writing, "_write_to", refuse)
-    with pytest.raises(TunnelError, match="cannot be written"):
-        keep(session, [("a.csv", b"1"), ("b.csv", b"2")])
-    assert list(tmp_path.iterdir()) == []
-    keep(session, [("a.csv", b"1")])
-    assert [path.name for path in session.uploads.iterdir()] == ["a.csv"]

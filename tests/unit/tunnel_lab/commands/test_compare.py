@@ -46,13 +46,6 @@ def after(tmp_path: Path) -> Path:
     )
 
 
-def test_an_interval_is_read(tunnel: Tunnel, before: Path, tmp_path: Path) -> None:
-    given = document()
-    given["coefficients"]["after"]["cn_r"]["interval"] = [-0.28, -0.24]
-    status, _, err = tunnel("compare", before, written(tmp_path / "skewed.json", **given))
-    assert (status, err) == (0, "")
-
-
 def test_widths_of_scatter_are_compared_in_per_cent(tunnel: Tunnel, before: Path, tmp_path: Path) -> None:
     scattering = written(tmp_path / "scattering.json", **scattering_document())
     status, out, err = tunnel("compare", before, scattering, "--format", "csv")
@@ -124,14 +117,6 @@ def test_a_program_gets_each_number_alone(tunnel: Tunnel, before: Path, after: P
 def test_a_fall_of_a_coefficient_is_a_number(tunnel: Tunnel, before: Path, after: Path) -> None:
     _, out, _ = tunnel("compare", after, before, "--format", "csv")
     assert "\nCnβ,1/rad,-0.004,0.0085" in out
-
-
-def test_text_and_markdown_say_the_same(tunnel: Tunnel, before: Path, after: Path) -> None:
-    for words in ([], ["--format", "md"]):
-        status, out, _ = tunnel("compare", before, after, *words)
-        assert status == 0
-        for part in ("27.350 ± 0.011", "0.4829 ± 0.0084", "quadratic_damping", "+0.5 σ"):
-            assert part in out
 
 
 def test_campaigns_of_one_name_go_by_their_files(tunnel: Tunnel, tmp_path: Path) -> None:

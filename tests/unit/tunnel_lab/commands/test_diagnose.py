@@ -142,20 +142,6 @@ def test_a_folder_without_a_campaign_is_one_line(tunnel: Tunnel, tmp_path: Path)
     assert "campaign.toml" in err
 
 
-def test_an_interrupted_run_leaves_no_file(
-    tunnel: Tunnel, gap_free: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def interrupted(*_: object, **__: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("diagnosis._diagnose.investigate", interrupted)
-    (tmp_path / "out").mkdir()
-    status, out, err = tunnel("diagnose", gap_free, "--json", tmp_path / "out" / "a.json")
-    assert (status, out) == (130, "")
-    assert err.count("\n") == 1
-    assert list((tmp_path / "out").iterdir()) == []
-
-
 @pytest.mark.slow
 def test_a_calm_campaign_without_held_out_runs_claims_neither_wind_nor_prediction(
     tunnel: Tunnel, tmp_path: Path
@@ -212,10 +198,8 @@ def test_records_without_noise_are_said_to_test_the_numerics(
     assert "almost no noise" in out
 
 
-def test_the_files_are_hashed(
-    tunnel: Tunnel, gap_free: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("tunnel_lab.report.page.inline_svg", lambda *_: "")  # nearly all of the time
+@pytest.mark.usefixtures("undrawn")
+def test_the_files_are_hashed(tunnel: Tunnel, gap_free: Path, tmp_path: Path) -> None:
     author, page = "A. Smith", tmp_path / "report.html"
     words = ("--effects", "sensor_drift", "--json", tmp_path / "a.json", "--report", page, "--author", author)
     assert tunnel("diagnose", gap_free, *words)[0] == 0

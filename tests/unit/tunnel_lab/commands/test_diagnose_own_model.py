@@ -131,12 +131,12 @@ def test_a_slide_is_diagnosed_as_a_displacement(tunnel: Tunnel, spring: Path, tm
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("undrawn")
 def test_the_control_of_a_robots_joint_from_its_folder(
     tunnel: Tunnel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The truth is that of MuJoCo's own steps: friction and a rotor that the model lacks."""
     monkeypatch.setattr(robot_joints, "TIME", robot_joints.TIME[:750])
-    monkeypatch.setattr("tunnel_lab.report.page.inline_svg", lambda *_: "")  # drawing has tests of its own
     truth = 'armature="0.05" damping="0.4" frictionloss="0.6" solreffriction="0.002 1"'
     folder = write_campaign(robot_campaign(robot(truth, axis=LEVEL), start=1.57), tmp_path / "arm")
     two = f'{MOTOR}<motor name="other" joint="elbow"/>'

@@ -78,11 +78,6 @@ def test_a_page_of_other_effects_is_another_page() -> None:
     assert reference_page(ALL_EFFECTS) != reference_page(ALL_EFFECTS[:-1])
 
 
-def test_unknown_effect_is_one_line(tunnel: Tunnel) -> None:
-    expected = "tunnel: unknown effect 'coulomb_fricton'; did you mean 'coulomb_friction'?\n"
-    assert tunnel("effects", "coulomb_fricton") == (2, "", expected)
-
-
 @pytest.mark.parametrize("kind", ALL_EFFECTS, ids=lambda kind: kind.name)
 def test_the_example_of_each_effect_can_be_given(kind: type[Effect]) -> None:
     option, text = shlex.split(example(kind))
@@ -133,30 +128,6 @@ def test_effects_are_added_to_the_plans(tunnel: Tunnel, tmp_path: Path) -> None:
     assert tunnel("simulate", plan, "--out", tmp_path / "d")[0] == 0
     for run in (tmp_path / "c" / "runs").iterdir():
         assert run.read_bytes() != (tmp_path / "d" / "runs" / run.name).read_bytes()
-
-
-@pytest.mark.parametrize(
-    ("effects", "part"),
-    [
-        (["coulomb_fricton:friction_moment=0.1"], "did you mean 'coulomb_friction'?"),
-        (["coulomb_friction:friction=0.1"], "did you mean 'friction_moment'?"),
-        (["coulomb_friction:friction_moment=nan"], "nan is out of range"),
-        (["coulomb_friction:friction_moment=-1"], "-1.0 is out of range"),
-        (["coulomb_friction"], "friction_moment is missing"),
-        ([FRICTION, FRICTION], "given twice"),
-        (["coulomb_friction:0.1"], "is not PARAMETER=VALUE"),
-        (["spring_miscalibration:error=0.1,spring_stiffness=1"], "no run has a spring_stiffness of 1"),
-    ],
-)
-def test_bad_effects_are_one_line_and_leave_nothing(
-    tunnel: Tunnel, tmp_path: Path, effects: list[str], part: str
-) -> None:
-    options = [word for effect in effects for word in ("--effect", effect)]
-    status, out, err = tunnel("simulate", PLAN, "--out", tmp_path / "c", *options)
-    assert (status, out) == (2, "")
-    assert err.count("\n") == 1
-    assert part in err
-    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(

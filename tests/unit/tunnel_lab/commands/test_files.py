@@ -54,29 +54,6 @@ def test_a_preview_writes_the_picture_alone(tunnel: Tunnel, tmp_path: Path) -> N
     assert sorted(one.name for one in tmp_path.iterdir()) == ["log.csv", "look.png"]
 
 
-@pytest.mark.parametrize(
-    ("options", "what"),
-    [
-        ([], "--out, --preview: give one of them"),
-        (["--out", "rig"], "add --yes"),
-        (["--out", "rig", "--delimiter", "x"], "'delimiter' = 'x'"),
-        (["--out", "rig", "--unit", "furlong"], "unknown unit 'furlong'"),
-        (["--out", "rig", "--set", "speed=1"], "unknown key 'speed'"),
-        (["--out", "rig", "--recipe", "none.toml"], "no such file"),
-        (["--out", "rig", "--rate", "0"], "'rate' = 0.0"),
-        (["--out", "rig", "--rest", "20"], "do not include the stated rest of 20 rad"),
-    ],
-)
-def test_bad_options_leave_nothing(
-    tunnel: Tunnel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: list[str], what: str
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    status, _, err = tunnel("import", record(tmp_path), *options)
-    assert (status, err.count("\n")) == (2, 1)
-    assert what in err
-    assert [path.name for path in tmp_path.iterdir()] == ["log.csv"]
-
-
 def test_options_take_a_decimal_comma(tunnel: Tunnel, tmp_path: Path) -> None:
     out = tmp_path / "rig"
     numbers = ("--set", "air_density=1,19,wind_speed=12,5", "--rest", "0,001", "--start", "0,5")

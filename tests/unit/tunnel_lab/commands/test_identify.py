@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import errno
 import json
-import os
 from pathlib import Path
 
 import pytest
 
 from tests.support.command import Tunnel
 from tests.support.diagnosis_document import document, scattering_document
-from tunnel_sim.files import writing
 
 PNG = b"\x89PNG\r\n\x1a\n"
 
@@ -38,17 +35,6 @@ def test_the_json_alone_goes_to_standard_output(tunnel: Tunnel, tiny_campaign: P
     assert set(document["cn_beta"]) == {"value", "std", "unit"}
     assert [run["id"] for run in document["runs"]] == ["r01", "r02"]
     assert set(document["runs"][0]["zeta"]) == {"value", "std", "unit"}
-
-
-def test_every_estimator_is_offered_by_name(tunnel: Tunnel, tiny_campaign: Path) -> None:
-    from identification.estimators import ALL_ESTIMATORS
-
-    _, help_text, _ = tunnel("identify", "--help")
-    for name in ALL_ESTIMATORS:
-        assert name in help_text
-        status, out, _ = tunnel("identify", tiny_campaign, "--estimator", name)
-        assert status == 0
-        assert f"tiny by {name}" in out
 
 
 def test_without_stiffness_the_form_is_normalised(tunnel: Tunnel, normalised_campaign: Path) -> None:
@@ -80,16 +66,6 @@ def test_an_estimate_that_fails_ends_with_status_one(
     assert status == 1
     assert Status.NO_RUN_IDENTIFIED.value in " ".join(out.split())
     assert json.loads((tmp_path / "estimate.json").read_text())["cn_beta"] is None
-
-
-def test_json_that_cannot_be_written_is_bad_input(
-    tunnel: Tunnel, tiny_campaign: Path, tmp_path: Path
-) -> None:
-    status, _, err = tunnel("identify", tiny_campaign, "--json", tmp_path / "missing" / "estimate.json")
-    assert status == 2
-    assert err.count("\n") == 1
-    assert "missing/estimate.json: its folder does not exist" in err
-    assert not (tmp_path / "missing").exists()
 
 
 def test_plot_writes_whole_figures(tunnel: Tunnel, tiny_campaign: Path, tmp_path: Path) -> None:
@@ -161,27 +137,3 @@ def test_plot_draws_how_the_runs_repeat(tunnel: Tunnel, tiny_campaign: Path, tmp
     status, _, err = tunnel("plot", tiny_campaign, "repeatability", "--out", tmp_path / "none")
     assert (status, err.count("\n")) == (2, 1)
     assert "is one of a diagnosis; give the file of tunnel diagnose --json" in err
-
-
-def test_plot_refuses_a_folder_that_cannot_be_made(
-    tunnel: Tunnel, tiny_campaign: Path, tmp_path: Path
-) -> None:
-    (tmp_path / "taken").write_text("")
-    status, out, err = tunnel("plot", tiny_campaign, "--out", tmp_path / "taken")
-    assert (status, out) == (2, "")
-    assert err.count("\n") == 1
-    assert "taken" in err
-
-
-def test_a_full_disk_leaves_no_empty_folder(
-    tunnel: Tunnel, tiny_campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def full(descriptor: int, _content: bytes) -> None:
-        os.close(descriptor)
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    monkeypatch.setattr(writing, "_write_to", full)
-    status, _, err = tunnel("plot", tiny_campaign, "--out", tmp_path / "new" / "figures")
-    assert (status, err.count("\n")) == (2, 1)
-    assert "no space left on device" in err
-    assert not (tmp_path / "new").exists()

@@ -28,7 +28,10 @@ SENSORS = {
 }  # fmt: skip
 
 
-@pytest.fixture(params=SENSORS)
+QUICK = ("noise free", "noisy", "step only")
+
+
+@pytest.fixture(params=[name if name in QUICK else slow(name) for name in SENSORS])
 def any_sensor(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     """One spring with the wind off and on, read by one of the sensors."""
     settings = [Setting(16.12, 0.0), Setting(16.12, 15.0)]
@@ -72,11 +75,6 @@ def test_diagnose(tunnel: Tunnel, any_sensor: Path, tmp_path: Path) -> None:
     assert status == 0
     assert all(PROGRESS.match(line) for line in err.splitlines())
     assert read(file.read_text(encoding="utf-8"))["causes"] is not None
-
-
-def test_effects(tunnel: Tunnel, tmp_path: Path) -> None:
-    assert tunnel("effects", "--json", tmp_path / "effects.json")[0] == 0
-    read((tmp_path / "effects.json").read_text(encoding="utf-8"))
 
 
 def test_a_verdict_on_the_residual_is_a_plain_truth_value() -> None:

@@ -120,40 +120,6 @@ def test_a_number_of_processes_is_called_jobs() -> None:
     assert set(helps) == {"--jobs"}
 
 
-@pytest.mark.parametrize(
-    ("words", "file", "right"),
-    [
-        (["diagnose", "c", "--report"], "r.pdf", ".html"),
-        (["diagnose", "c", "--pdf"], "r.html", ".pdf"),
-        (["diagnose", "c", "--json"], "r.html", ".json"),
-        (["diagnose", "c", "--model", "m.xml", "--joint", "j", "--patch"], "r.urdf", ".xml"),
-        (["diagnose", "c", "--propose"], "law.json", ".toml"),
-        (["identify", "c", "--json"], "e.csv", ".json"),
-        (["simulate", "plan.toml", "--out", "c", "--picture"], "runs.pdf", ".png"),
-        (["import", "log.csv", "--preview"], "import.jpg", ".png"),
-        (["export", "c", "--file-format", "csv", "--out"], "c.mat", ".csv"),
-        (["plan", "p.toml", "--drive", "--moment", "1", "--amplitude", "0.1", "--out"], "d.json", ".toml"),
-        (["blind", "score", "set", "--figure"], "f.pdf", ".png"),
-        (["blind", "score", "set", "--markdown"], "f.html", ".md"),
-        (["effects", "--json"], "e.md", ".json"),
-        (["effects", "--markdown"], "e.json", ".md"),
-        (["score", "--write-baseline"], "b.csv", ".parquet"),
-        (["schema", "plan", "--out"], "s.toml", ".json"),
-        (["render", "--out"], "film.gif", ".mp4"),
-        (["train"], "weights.bin", ".safetensors"),
-    ],
-)
-def test_a_file_of_another_format_than_its_name_is_refused(
-    tunnel: Tunnel, tmp_path: Path, monkeypatch: Any, words: list[str], file: str, right: str
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    status, out, err = tunnel(*words, file)
-    assert (status, out, err.count("\n")) == (2, "", 1)
-    assert file in err
-    assert right in err
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_bench_of_a_folder_that_is_not_there_makes_none(
     tunnel: Tunnel, tmp_path: Path, monkeypatch: Any
 ) -> None:

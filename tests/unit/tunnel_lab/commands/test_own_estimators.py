@@ -8,25 +8,22 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import polars as pl
 import pytest
 
 from identification import estimators, identify, make_estimator, register_estimator
 from identification.datasets import measured_campaign
 from identification.estimators.matrix_pencil import MatrixPencil
-from tests.reference.free_decays import TWELVE, campaign
 from tests.support.driven_runs import driven
 from tests.support.small_sweep import SMALL
-from tunnel_lab.experiments import breakdown, runner
-from tunnel_lab.experiments.experiment import results_of, run_in
+from tunnel_lab.experiments import runner
+from tunnel_lab.experiments.experiment import run_in
 from tunnel_lab.experiments.runner import processes
 from tunnel_lab.experiments.score import score_grid
 from tunnel_lab.experiments.score_grid import load_grid
 from tunnel_lab.experiments.sweep import read_sweep
 from tunnel_sim import TunnelError
 
-ROOT = Path(__file__).parents[4]
 MODULE = '''
 from dataclasses import replace
 
@@ -245,23 +242,6 @@ def test_an_exception_fails_the_check(tunnel) -> None:
     assert RAISED in err
 
 
-def test_the_breakdown_takes_it_into_its_processes(folder: Path) -> None:
-    sys.path.insert(0, str(folder))
-    names = [estimators.register_from(f"own_method:{kind}") for kind in ("Mine", "Broken")]
-    given = campaign(TWELVE[:4], noise=5e-4, duration=4.0, rate=200.0, rng=np.random.default_rng(1))
-    case = breakdown.BiasCase(
-        "no effect", 0.0, 0.0, 0, given, dict.fromkeys(breakdown.QUANTITIES, 1e-3), vars(breakdown.TRUTH)
-    )
-    rows, outcome = results_of(breakdown.breakdown_of([case], tuple(names), 1), None, processes(1))
-    mine, broken = (rows.filter(pl.col("estimator") == name) for name in names)
-    assert mine["value"].null_count() == 0
-    assert set(broken["status"]) == {"raised TypeError"}
-    (failed,) = outcome.failed
-    said, traceback = failed.lines
-    assert said == "broken raised an exception once; counted as failures. The first:"
-    assert RAISED in traceback
-
-
 @pytest.mark.usefixtures("folder")
 def test_a_wrong_return_is_one_line_in_every_command(tunnel, tiny_campaign: Path) -> None:
     said = r"estimator not_a_number: zeta of run \S+ with campaign .* is nan ± .*; give None and a status"
@@ -313,16 +293,6 @@ def test_sweep_takes_it_into_its_processes(folder: Path) -> None:
     again = in_a_process(*words, cwd=folder)
     assert again.returncode == 2
     assert "the file of estimator mine has changed since the sweep was begun; name another" in again.stderr
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("folder")
-def test_sweep_prints_the_first_traceback(tunnel) -> None:
-    status, _, err = tunnel("sweep", "small.toml", "--out", "out", "--jobs", "1", "-e", "own_method:Broken")
-    assert status == 1
-    assert "broken raised an exception once; counted as failures. The first:" in err
-    assert err.count("Traceback") == 1
-    assert RAISED in err
 
 
 def test_a_sweep_file_may_name_a_registered_one(folder: Path) -> None:

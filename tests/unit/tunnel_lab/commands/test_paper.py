@@ -36,18 +36,6 @@ def test_quick_parts(tunnel: Tunnel, tmp_path: Path) -> None:
     }
 
 
-def test_bad_input_is_one_line(tunnel: Tunnel, tmp_path: Path) -> None:
-    status, out, err = tunnel("paper", "--out", tmp_path / "p", "--only", "table-5")
-    assert (status, out) == (2, "")
-    assert err.count("\n") == 1
-    assert "no part 'table-5'" in err
-    assert not (tmp_path / "p").exists()
-    (tmp_path / "file").write_text("x")
-    status, _, err = tunnel("paper", "--out", tmp_path / "file", "--only", "table-1")
-    assert status == 2
-    assert err.count("\n") == 1
-
-
 @pytest.mark.slow
 def test_the_whole_page(tunnel: Tunnel, tmp_path: Path) -> None:
     status, out, err = tunnel("paper", "--out", tmp_path)

@@ -63,28 +63,6 @@ def test_rig_time_and_buffeting_can_be_given(tunnel: Tunnel, plan: Path, tmp_pat
     assert [effect.parameters["intensity"] for effect in made.effects] == [0.02]
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (LIMITS, "nothing to plan; add --drive"),
-        (("--drive", "--moment", "0", "--amplitude", "0.3"), "--moment: 0 is out of range; give a number"),
-        (("--drive", "--moment", "1", "--amplitude", "nan"), "--amplitude: nan is out of range"),
-        (
-            ("--drive", *LIMITS, "--minutes", "3"),
-            "leaves no time for records: starts and changes take 9.03 min",
-        ),
-        (("--drive", *LIMITS, "--buffeting", "-1"), "intensity = -1.0 is out of range"),
-    ],
-)
-def test_a_bad_option_is_one_line_and_writes_nothing(
-    tunnel: Tunnel, plan: Path, tmp_path: Path, options: tuple[str, ...], message: str
-) -> None:
-    out = tmp_path / "driven.toml"
-    status, _, err = tunnel("plan", plan, *options, "--out", out)
-    assert (status, len(err.strip().splitlines()), out.exists()) == (2, 1, False)
-    assert message in err
-
-
 def test_a_driven_plan_and_the_plan_itself_are_refused(tunnel: Tunnel, plan: Path, tmp_path: Path) -> None:
     status, _, err = tunnel("plan", plan, "--drive", *LIMITS, "--out", plan)
     assert (status, plan.read_text(encoding="utf-8")) == (2, PLAN)

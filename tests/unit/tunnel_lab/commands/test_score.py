@@ -3,10 +3,6 @@
 from __future__ import annotations
 
 import io
-import signal
-import subprocess
-import sys
-import time
 from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import replace
@@ -167,29 +163,6 @@ def test_a_new_estimator_is_said_to_be_unchecked(tunnel: Tunnel, baseline: Path)
     assert "not checked: conventional" in out
 
 
-@pytest.mark.parametrize(
-    ("arguments", "parts"),
-    [
-        (["--estimator", "matrix_pencl"], ["did you mean 'matrix_pencil'"]),
-        (["--check", "none.parquet"], ["none.parquet", "no such file"]),
-        (["missing.toml"], ["missing.toml", "no such file"]),
-        (["--write-baseline", "no/such/folder.parquet"], ["folder"]),
-        (["--breakdown", "--check", "packaged"], ["--check", "cannot be combined with --breakdown"]),
-        (["--trials", "1"], ["--trials"]),
-        (["--jobs", "-1"], ["--jobs"]),
-    ],
-)
-def test_bad_input_is_one_line_and_leaves_nothing(
-    tunnel: Tunnel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], parts: list[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    status, out, err = tunnel("score", *arguments)
-    assert (status, out, err.count("\n")) == (2, "", 1)
-    for part in parts:
-        assert part in err
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_baseline_of_other_cells_or_of_a_vanished_estimator_is_refused(
     tunnel: Tunnel, grid: Path, baseline: Path, tmp_path: Path
 ) -> None:
@@ -203,40 +176,3 @@ def test_a_baseline_of_other_cells_or_of_a_vanished_estimator_is_refused(
     status, _, err = tunnel("score", grid, "--check", tmp_path / "gone.parquet", "--jobs", "0")
     assert status == 2
     assert "gone_one, which no installed package adds" in err
-
-
-@pytest.mark.slow
-def test_an_interrupted_score_keeps_what_is_done_and_goes_on(
-    tunnel: Tunnel, grid: Path, tmp_path: Path
-) -> None:
-    """A real process with two children, interrupted by a real signal."""
-    out = tmp_path / "scores"
-    command = ["score", str(grid), "--estimator", "matrix_pencil", "--trials", "800", "--out", str(out)]
-    with subprocess.Popen(
-        [sys.executable, "-m", "tunnel_lab.cli", *command], stderr=subprocess.PIPE, text=True
-    ) as process:
-        until = time.monotonic() + 120.0
-        while len(list(out.glob("parts/results/*.parquet"))) < 4 and time.monotonic() < until:
-            time.sleep(0.05)
-        process.send_signal(signal.SIGINT)
-        _, err = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert err.startswith("tunnel: interrupted")
-    kept = list(out.glob("parts/results/*.parquet"))
-    assert 4 <= len(kept) < 320
-    times = pl.read_parquet(min(kept))["milliseconds"]
-    assert tunnel(*command)[0] == 0
-    assert not (out / "parts").exists()  # the times show that it was not estimated again
-    assert set(times) <= set(pl.read_parquet(out / "trials.parquet")["milliseconds"])
-
-
-def test_the_parts_of_an_earlier_version_are_refused_in_a_line(
-    tunnel: Tunnel, grid: Path, tmp_path: Path
-) -> None:
-    (tmp_path / "scores" / "parts").mkdir(parents=True)
-    (tmp_path / "scores" / "parts" / "c0000-t00000.json").write_text("{}")
-    command = ("score", grid, *HERE, "--trials", "3", "--out", tmp_path / "scores")
-    status, out, err = tunnel(*command)
-    assert (status, out, err.count("\n")) == (2, "", 1)
-    assert "the folder holds something else; name another --out, or add --overwrite" in err
-    assert tunnel(*command, "--overwrite")[0] == 0

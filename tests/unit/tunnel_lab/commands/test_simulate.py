@@ -57,27 +57,6 @@ def test_a_campaign_is_not_overwritten_unasked(tunnel: Tunnel, tmp_path: Path) -
     assert contents(tmp_path / "c") != before
 
 
-@pytest.mark.parametrize(
-    ("text", "part"),
-    [
-        ("name = [", "TOML"),
-        (PLAN.read_text().replace("springs = [5]", "springs = [11]"), "there is no spring 11"),
-        (PLAN.read_text().replace("seed = 1", "sed = 1"), "sed"),
-        (PLAN.read_text().replace("cn_beta = 0.495", "cn_beta = nan"), "cn_beta"),
-    ],
-)
-def test_a_bad_plan_is_one_line_and_leaves_nothing(
-    tunnel: Tunnel, tmp_path: Path, text: str, part: str
-) -> None:
-    (tmp_path / "plan.toml").write_text(text, encoding="utf-8")
-    status, out, err = tunnel("simulate", tmp_path / "plan.toml", "--out", tmp_path / "c")
-    assert (status, out) == (2, "")
-    assert err.count("\n") == 1
-    assert "plan.toml" in err
-    assert part in err
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["plan.toml"]
-
-
 def test_a_folder_below_a_file_is_refused(tunnel: Tunnel, tmp_path: Path) -> None:
     (tmp_path / "taken").write_text("")
     status, out, err = tunnel("simulate", PLAN, "--out", tmp_path / "taken" / "c")

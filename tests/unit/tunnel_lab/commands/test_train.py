@@ -2,8 +2,6 @@
 
 import json
 
-import pytest
-
 from tunnel_lab.cli import main
 
 QUICK = ["--starts", "1", "--steps", "8"]
@@ -62,24 +60,6 @@ def test_a_restart_gives_the_same_bits_and_takes_nothing_from_an_interrupted_tra
     assert main(["train", str(out), "--restart", *QUICK]) == 0
     assert len(taken) == 5 + 16  # every step was taken again
     assert (out.read_bytes(), out.with_suffix(".json").read_bytes()) == (whole, record)
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["w.st"], "does not end in .safetensors"),
-        (["none/w.safetensors"], "its folder does not exist"),
-        (["w.safetensors", "--zeta", "0.3", "0.1"], "0.3 0.1 is not a range"),
-        (["w.safetensors", "--omega", "0", "26"], "0 26 is not a range"),
-    ],
-)
-def test_bad_input_is_one_line_and_nothing_written(words, said, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert main(["train", *words]) == 2
-    error = capsys.readouterr().err
-    assert said in error
-    assert error.count("\n") == 1
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_identify_takes_weights_for_the_networks_only(tmp_path, capsys):

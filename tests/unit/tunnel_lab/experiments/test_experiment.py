@@ -137,16 +137,6 @@ def test_stopped_or_out_of_disk_at_the_beginning_it_continues(
     assert store.finished() == set()
 
 
-def test_the_folders_that_an_earlier_version_made_first_are_no_obstacle(sweep: Sweep, tmp_path: Path) -> None:
-    for name in ("results", "records"):
-        (tmp_path / "out" / name).mkdir(parents=True)
-    begin(sweep.experiment, tmp_path / "out")
-    (tmp_path / "other" / "results").mkdir(parents=True)
-    (tmp_path / "other" / "results" / "mine.txt").write_text("")
-    with pytest.raises(TunnelError, match="the folder holds something else"):
-        begin(sweep.experiment, tmp_path / "other")
-
-
 def test_half_a_part_is_done_again(sweep: Sweep, here, tmp_path: Path) -> None:
     store, _ = run_in(sweep.experiment, tmp_path / "out", here)
     whole = contents(tmp_path / "out")

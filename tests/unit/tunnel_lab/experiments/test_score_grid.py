@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,10 +9,9 @@ import pytest
 from identification import identify
 from identification.scoring import score
 from tests.reference.free_decays import damped_cosine
-from tunnel_lab.experiments import experiment
 from tunnel_lab.experiments import score as score_trials
 from tunnel_lab.experiments.runner import processes
-from tunnel_lab.experiments.score import TrialBatch, read_trials, write_trials
+from tunnel_lab.experiments.score import read_trials, write_trials
 from tunnel_lab.experiments.score_grid import Cell, Grid, draw_trial, effects_of, load_grid, packaged_grid
 from tunnel_lab.experiments.score_view import scores_frame
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -33,10 +31,6 @@ def small(tmp_path):
         HEAD + DECAYS + CAMPAIGNS + 'effects = ["none", "coulomb_friction:friction_moment=0.002"]\n'
     )
     return load_grid(path)
-
-
-def timeless(results):
-    return results.table.drop("milliseconds").to_dicts()
 
 
 def test_every_combination_is_a_cell(small):
@@ -100,54 +94,11 @@ def test_the_bound_is_that_of_the_start_actually_released():
         assert bound == pytest.approx(nominal.std(name), rel=0.12)  # releases scatter by 3 %
 
 
-@pytest.mark.slow
-def test_the_number_of_processes_changes_no_bit_and_an_interruption_costs_little(
-    small, tmp_path, monkeypatch
-):
-    here, _ = score_trials.score_grid(small, NAMES, processes(0))
-    reported = []
-    there, _ = score_trials.score_grid(
-        small, NAMES, processes(2), parts=tmp_path / "parts", progress=lambda *now: reported.append(now)
-    )
-    assert timeless(here) == timeless(there)
-    assert reported[0] == (0, 16)
-    assert reported[-1] == (16, 16)
-    # All is kept: only a part that was damaged is estimated again, and other work is refused.
-    (tmp_path / "parts" / "results" / "c0001-t00000.parquet").write_text("PAR1")
-    done = []
-    real = score_trials.score_unit
-    monkeypatch.setattr(score_trials, "score_unit", lambda *given: done.append(given[-1]) or real(*given))
-    again, _ = score_trials.score_grid(small, NAMES, processes(0), parts=tmp_path / "parts")
-    assert timeless(again) == timeless(here)
-    assert done == [TrialBatch(1, 0, 4)]
-    with pytest.raises(TunnelError, match=r"another score, whose seed differs; .* add --overwrite"):
-        score_trials.score_grid(replace(small, seed=2), NAMES, processes(0), parts=tmp_path / "parts")
-    monkeypatch.setattr(experiment, "_code", lambda: "changed")
-    with pytest.raises(TunnelError, match="the code has changed since the score was begun"):
-        score_trials.score_grid(small, NAMES, processes(0), parts=tmp_path / "parts")
-
-
 def test_slow_methods_see_the_first_trials(small):
     results, _ = score_trials.score_grid(
         replace(small, trials_of=(("conventional", 2),)), NAMES, processes(0)
     )
     assert set(results.table["trial"]) == {0, 1}
-
-
-def test_an_estimator_that_raises_is_a_failure_that_is_named(small, monkeypatch):
-    from identification.estimators.conventional import Conventional
-
-    def fall(*_):
-        raise np.linalg.LinAlgError("singular")
-
-    monkeypatch.setattr(Conventional, "estimate", fall)
-    results, (failed,) = score_trials.score_grid(small, NAMES, processes(0))
-    said, traceback = failed.lines
-    assert said.startswith("conventional raised an exception 16 times")
-    assert traceback.endswith("numpy.linalg.LinAlgError: singular")
-    assert f"{Path(__file__).name}" in traceback
-    assert {trials.failures for trials in results.trials.values()} == {4}
-    assert scores_frame(results)["failure_share"].to_list() == [1.0] * 12
 
 
 def test_trials_survive_the_disk(small, tmp_path):

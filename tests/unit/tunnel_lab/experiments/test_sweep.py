@@ -21,7 +21,6 @@ from tunnel_sim.engine.virtual_campaign import simulate_campaign
 from tunnel_sim.files.plan_file import load_plan
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.vocabulary.between_runs import Scatter
-from tunnel_sim.vocabulary.errors import TunnelError
 
 
 def variant(folder: Path, *changes: tuple[str, str]) -> Sweep:
@@ -101,17 +100,6 @@ def test_a_case_can_be_simulated_by_itself(sweep: Sweep, tmp_path: Path) -> None
         assert np.array_equal(run.record.yaw_rad, np.array(yaw))
 
 
-@pytest.mark.slow
-def test_threads_and_company_leave_the_bits_alone(tmp_path: Path, sweep: Sweep) -> None:
-    together = variant(tmp_path, ("cases_per_shard = 1", "cases_per_shard = 12"))
-    one, two = (run_shard(together, 0, nthread=n) for n in (1, 2))
-    assert one.files == two.files
-    alone = [pl.read_parquet(run_shard(sweep, index).files["results"]) for index in (0, 7, 11)]
-    whole = pl.read_parquet(one.files["results"])
-    for part, index in zip(alone, (0, 7, 11), strict=True):
-        assert part.equals(whole.filter(pl.col("case") == index), null_equal=True)
-
-
 @pytest.mark.parametrize(("speed", "name"), [(0.0, "s8-v0-a20"), (15.0, "s8-v15-a20")])
 def test_the_truth_of_a_run_is_the_nominal_models(sweep: Sweep, speed: float, name: str) -> None:
     """Against the equation of motion written out; stiffness, inertia and damping by hand from rig and file."""
@@ -159,13 +147,6 @@ def test_scatter_is_in_the_results_and_an_axis_of_the_summary(tmp_path: Path) ->
     assert [(line.at, line.score.count) for line in along] == [(0.0, 4), (0.003, 4), (0.01, 4)]
     again = lines_of(rows.filter(pl.col("quantity") == "cn_r"), "conventional", "cn_r")
     assert [line.score.count for line in again if line.axis == "noise_std"] == [6, 6]
-
-
-def test_a_number_that_scatters_twice_is_refused(tmp_path: Path) -> None:
-    twice = ('name = "coulomb_friction"\nparameters = { friction_moment = [0.002, 0.02] }',
-             'name = "wind_speed_scatter"\nparameters = { spread = 0.01 }')  # fmt: skip
-    with pytest.raises(TunnelError, match="wind_speed scatters twice"):
-        variant(tmp_path, ('[[effects]]\nname = "none"', SCATTER), twice)
 
 
 LONG = """

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import re
 import shutil
-import subprocess
-import sys
 from itertools import pairwise
 from pathlib import Path
 
@@ -304,12 +302,3 @@ def test_a_figure_without_quantities_to_draw_is_none() -> None:
     lines: list[ScoreLine] = [*lines_of(hand_made([1.0, 2.0, 3.0, 4.0]), "e", "yaw_inertia")]
     assert sweep_view.error_figure(lines[1:]) is None
     assert "noise_std" in RESULT_COLUMNS
-
-
-def test_the_sweep_package_loads_nothing_heavy() -> None:
-    code = (
-        "import sys, tunnel_lab.commands.sweep, tunnel_lab.experiments.runner\n"
-        "print(sorted({'mujoco', 'numpy', 'polars', 'dask', 'distributed'} & set(sys.modules)))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"

@@ -47,9 +47,3 @@ def test_the_file_is_read_and_the_code_runs(here, tmp_path: Path, monkeypatch: p
 
 def test_every_column_is_on_the_page() -> None:
     assert [name for name in RESULT_COLUMNS if f"`{name}`" not in TEXT] == []
-
-
-def test_the_links_lead_somewhere() -> None:
-    links = [link for link in re.findall(r"\]\(([^)]+)\)", TEXT) if "://" not in link]
-    assert links
-    assert [link for link in links if not (PAGE.parent / link).exists()] == []

@@ -12,8 +12,8 @@ from tests.support.rendered import law_figure, place_figure, symbol_rows
 from tunnel_lab.report import render_report
 
 
-def test_symbols_of_coefficients_and_causes_are_explained(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tunnel_lab.report.page.inline_svg", lambda *_: "")  # drawing takes most of the time
+@pytest.mark.usefixtures("undrawn")
+def test_symbols_of_coefficients_and_causes_are_explained() -> None:
     rows = dict(symbol_rows(findings_of(document())))
     assert {"Cnβ", "Cnr", "β", "β̇", "V", "l", "C2"} <= set(rows)
     assert "ωn" not in rows  # nothing in this document has it

@@ -12,66 +12,15 @@ import pytest
 
 from tests.skips import PLATFORM
 from tests.support.command import Tunnel
-from tunnel_lab.show.film import Look, backends, draw_trace, shown_run, write_film
+from tunnel_lab.show.film import backends, draw_trace, shown_run
 from tunnel_lab.show.live import missing_display, view_in_window
 from tunnel_lab.show.request import Request
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
 from tunnel_sim.files.writing import as_json
-from tunnel_sim.vocabulary.errors import TunnelError
 
 PLAN = Path(__file__).parents[3] / "data" / "tiny-plan.toml"
 SMALL = ("--size", "240x160", "--duration", "0.6")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (("--spring", "99"), "there is no spring 99"),
-        (("--wind", "-1"), "--wind"),
-        (("--wind", "nan"), "--wind"),
-        (("--angle", "90"), "--angle"),
-        (("--duration", "0"), "--duration"),
-        (("--run", "x"), "there is no plan"),
-        ((PLAN, "--run", "nonsense"), "has no run 'nonsense'"),
-        (("nowhere.toml",), "nowhere.toml"),
-        (("--effect", "coulomb_frictoin:friction_moment=1"), "did you mean 'coulomb_friction'"),
-        (("--effect", "coulomb_friction"), "friction_moment is missing"),
-        (("--camera", "behind"), "there is no camera 'behind'"),
-    ],
-)
-@pytest.mark.parametrize("command", ["view", "render"])
-def test_bad_input_is_one_clear_line(
-    command: str, arguments: tuple[str, ...], said: str, tunnel: Tunnel, tmp_path: Path, monkeypatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    out = ("--out", "film.mp4") if command == "render" else ()
-    status, _, error = tunnel(command, *arguments, *out)
-    assert status == 2
-    assert said in error
-    assert error.count("\n") == 1
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (("--out", "film.gif"), "neither .mp4 nor .png"),
-        (("--out", "nowhere/film.mp4"), "its folder does not exist"),
-        (("--out", "a.png", "--size", "100x100"), "--size"),
-        (("--out", "a.png", "--size", "big"), "--size"),
-        (("--out", "a.png", "--size", "321x240"), "--size"),
-        (("--out", "a.png", "--at", "99"), "99 s is not in the run"),
-        (("--out", "a.png", "--fps", "0"), "fps"),
-    ],
-)
-def test_render_refuses(arguments, said, tunnel: Tunnel, tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    status, _, error = tunnel("render", *arguments)
-    assert status == 2
-    assert said in error
-    assert error.count("\n") == 1
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_machine_that_cannot_draw_is_told_what_to_install(
@@ -113,15 +62,6 @@ def test_film_and_picture_are_whole_where_the_machine_can_draw(tunnel: Tunnel, t
     body, trace = slice(0, 120), slice(130, 240)  # left the body, right the trace: both move
     for part in (body, trace):
         assert np.abs(frames[0][:, part].astype(int) - frames[3][:, part]).max() > 60
-
-
-def test_an_interrupted_film_leaves_nothing(tmp_path: Path) -> None:
-    def interrupt(*_: int) -> None:
-        raise KeyboardInterrupt
-
-    with pytest.raises((KeyboardInterrupt, TunnelError)):  # the latter where the machine cannot draw
-        write_film(Request(duration=0.6), Look(240, 160, fps=10), tmp_path / "film.mp4", interrupt)
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_trace_grows_to_where_the_run_is() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import subprocess
 import sys
@@ -71,21 +70,6 @@ def test_a_reader_that_goes_away_is_not_an_error(
     assert capsys.readouterr().err == ""
 
 
-@pytest.mark.slow
-def test_score_writes_before_it_prints(tmp_path: Path) -> None:
-    words = ("score", "--estimator", "hilbert", "--jobs", "0", "--trials", "2")
-    status = unheard(*words, "--out", tmp_path / "s", "--write-baseline", tmp_path / "b.parquet")
-    assert status == 0
-    assert sorted(path.name for path in (tmp_path / "s").iterdir()) == [
-        "index.html",
-        "score.pdf",
-        "score.png",
-        "scores.parquet",
-        "trials.parquet",
-    ]
-    assert (tmp_path / "b.parquet").exists()
-
-
 def started(*words: str | Path, **options: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-m", "tunnel_lab.cli", *map(str, words)],
@@ -114,20 +98,6 @@ def test_a_full_disk_below_standard_output_is_one_line() -> None:
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert "no space left" in done.stderr
-
-
-def test_json_through_a_link(tunnel: Tunnel, tmp_path: Path) -> None:
-    (tmp_path / "link").symlink_to(tmp_path / "real.json")
-    (tmp_path / "real.json").write_text("old")
-    assert tunnel("effects", "--json", tmp_path / "link")[0] == 0
-    assert (tmp_path / "link").is_symlink()
-    assert json.loads((tmp_path / "real.json").read_text(encoding="utf-8"))
-
-
-def test_json_to_a_device(tunnel: Tunnel) -> None:
-    status, _, err = tunnel("effects", "--json", "/dev/null")
-    assert (status, err) == (0, "")
-    assert Path("/dev/null").is_char_device()
 
 
 @pytest.mark.parametrize("command", ["identify", "diagnose", "effects"])

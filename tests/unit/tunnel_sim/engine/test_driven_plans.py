@@ -79,25 +79,6 @@ def test_dry_friction_is_named(tmp_path: Path) -> None:
     assert found.gap.closed > 0.99
 
 
-def test_the_bits_do_not_depend_on_threads_and_the_noise_only_on_the_seed(
-    tmp_path: Path,
-) -> None:
-    plan = planned(
-        tmp_path, "release_angles_deg = [20.0]" + MULTISINE.replace("duration = 8.0", "duration = 4.0")
-    )
-    one, three, other = (
-        simulate_campaign(plan, nthread=1),
-        simulate_campaign(plan, nthread=3),
-        simulate_campaign(replace(plan, seed=4)),
-    )
-    for a, b, c in zip(one.runs, three.runs, other.runs, strict=True):
-        assert np.array_equal(a.record.yaw_rad, b.record.yaw_rad)
-        assert not np.array_equal(a.record.yaw_rad, c.record.yaw_rad)
-        assert (a.drive is None) == (a.release_angle is not None)
-        if a.drive is not None and c.drive is not None:
-            assert np.array_equal(a.drive.values, c.drive.values)
-
-
 def test_the_root_pulls_with_the_true_spring(tmp_path: Path) -> None:
     plan = planned(tmp_path, f'{PLAN}kind = "chirp"\n{BAND}{ROOT}')
     stated = replace(plan, conditions=plan.conditions[:1])

@@ -93,13 +93,6 @@ def test_backlash_acts_ahead_of_the_sensors_own_effects(plan: CampaignPlan) -> N
     assert names == ["sensor_hysteresis", "coulomb_friction", "sensor_nonlinearity", "sensor_clipping"]
 
 
-def test_progress_counts_every_run(plan: CampaignPlan) -> None:
-    calls: list[tuple[int, int]] = []
-    simulate_campaign(plan, progress=lambda done, total: calls.append((done, total)))
-    assert calls[-1] == (4, 4)
-    assert [done for done, _ in calls] == sorted(done for done, _ in calls)
-
-
 def test_the_truth_holds_what_was_injected(plan: CampaignPlan) -> None:
     truth = json.loads(json.dumps(truth_document(plan), allow_nan=False))
     assert {key: truth[key] for key in ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")} == {

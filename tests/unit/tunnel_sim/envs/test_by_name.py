@@ -19,29 +19,6 @@ def printed(code: str, *paths: Path, first: str = "import gymnasium") -> str:
     return done.stdout + done.stderr.strip().rpartition("\n")[2]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["FreeDecay-v0", "Campaign-v0"])
-def test_the_name_with_its_module_needs_no_import(name: str) -> None:
-    code = f'env = gymnasium.make("tunnel_sim.envs:tunnel_sim/{name}")\nprint(env.spec.id, len(env.reset(seed=1)))'
-    assert printed(code) == f"tunnel_sim/{name} 2\n"
-    many = f'envs = gymnasium.make_vec("tunnel_sim.envs:tunnel_sim/{name}", num_envs=2)\nprint(envs.num_envs)'
-    assert printed(many) == "2\n"
-
-
-def test_gymnasium_reads_no_entry_points(tmp_path: Path) -> None:
-    """Where a later version does again, an entry point makes the name alone work: then declare it."""
-    about = tmp_path / "planted-1.dist-info"
-    about.mkdir()
-    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: planted\nVersion: 1\n")
-    (about / "entry_points.txt").write_text(
-        "[gymnasium.envs]\ntunnel_sim = tunnel_sim.envs:register_environments\n"
-    )
-    found = "from importlib.metadata import entry_points\nprint(len(entry_points(group='gymnasium.envs')))\n"
-    said = printed(found + 'gymnasium.make("tunnel_sim/FreeDecay-v0")', tmp_path)
-    assert said.startswith("1\n")
-    assert "Namespace tunnel_sim not found" in said
-
-
 @pytest.mark.parametrize("order", ["import tunnel_sim, gymnasium", "import gymnasium, tunnel_sim"])
 def test_the_name_alone_works_beside_the_package_in_any_order(order: str) -> None:
     code = f'{order}\nprint(gymnasium.spec("tunnel_sim/Campaign-v0").id)'

@@ -60,11 +60,6 @@ def test_registering_twice_does_nothing() -> None:
     assert NAME in before
 
 
-def test_a_misspelt_name_is_corrected() -> None:
-    with pytest.raises(gymnasium.error.NameNotFound, match="FreeDecay"):
-        gymnasium.make("tunnel_sim/FreeDecy-v0")
-
-
 def test_a_name_with_its_module_needs_no_import_of_ours() -> None:
     script = f"""
 import sys

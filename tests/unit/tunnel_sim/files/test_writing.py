@@ -235,34 +235,6 @@ def test_a_full_disk_is_one_line() -> None:
         write_whole(Path("/dev/full"), b"content")
 
 
-LIMITED = """
-import resource, signal, sys
-from pathlib import Path
-import numpy as np
-signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
-from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.files.campaign_folder import write_campaign
-from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.record import Record
-time = np.arange(5000) / 500.0
-run = Run("a", Record(time, 0.3 * np.cos(9.0 * time) + 1e-3 * np.sin(1e4 * time)), 0.0)
-campaign = Campaign("c", RigProperties(), SensorProperties(), (run,))
-try:
-    write_campaign(campaign, Path(sys.argv[1]) / "c", run_format=sys.argv[2])
-except TunnelError as error:
-    print(error)
-"""
-
-
-@pytest.mark.parametrize("run_format", ["parquet", "csv"])
-def test_a_disk_that_fills_while_a_campaign_is_written_is_one_line(tmp_path: Path, run_format: str) -> None:
-    done = child(LIMITED, tmp_path, run_format)
-    assert done.stderr == ""
-    assert "c: cannot be written (file too large)" in done.stdout
-    assert list(tmp_path.iterdir()) == []
-
-
 class Panic(BaseException):
     """As libraries written in Rust raise it."""
 

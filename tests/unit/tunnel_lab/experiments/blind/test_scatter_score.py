@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 
-import pytest
-
 from diagnosis.findings.terms import SCATTERS
 from identification.statistics import Proportion
 from tests.unit.tunnel_lab.experiments.blind.test_set_score import TRUTH, document
@@ -14,7 +12,6 @@ from tunnel_lab.experiments.blind.answers import scored
 from tunnel_lab.experiments.blind.cases import case, found_by_group, inclusions
 from tunnel_lab.experiments.blind.scatter_score import scatter_score
 from tunnel_lab.experiments.blind.set_score import BlindScore
-from tunnel_sim.vocabulary.errors import TunnelError
 
 SPEED = {"wind_speed": 0.003}
 THREE = {"wind_speed": 0.003, "spring_stiffness": 0.0005, "mechanical_damping": 0.01}
@@ -122,20 +119,6 @@ def test_a_set_whose_runs_repeat_says_nothing_of_scatter():
     assert score.scatter() is None
     assert "catter" not in blind.markdown(score, "set").replace("runs that repeat", "")
     assert score.to_json_dict()["scatter"] is None
-
-
-@pytest.mark.parametrize(
-    "said",
-    [
-        {"spreads": [{"effect": "wind_speed_scatter", "width": 0.003}]},
-        spreads({"wind_speed": width(-1.0, 0.0, 1.0)}),
-        spreads({"wind_speed": width(0.1, 0.0, 1.0) | {"interval": [0.1]}}),
-        [1],
-    ],
-)
-def test_a_malformed_scatter_is_refused(said):
-    with pytest.raises(TunnelError, match="is not a diagnosis"):
-        scored(document([]) | {"repeatability": said}, "c.json")
 
 
 def test_where_no_width_is_asked_for_none_are_shown():

@@ -12,43 +12,34 @@ import numpy as np
 import pytest
 
 from identification.statistics import Proportion
-from tests.reference.rigs import rig
+from tests.reference.rigs import short_campaigns
 from tests.support.gone_reader import unheard
 from tests.unit.tunnel_lab.experiments.blind.test_set_score import document
 from tunnel_lab.cli import main
-from tunnel_lab.experiments.blind import answer_set, answers_folder, make_blind, score_set, sets
+from tunnel_lab.experiments.blind import answer_set, make_blind, score_set, sets
 from tunnel_lab.experiments.blind import answers as answer
-from tunnel_lab.experiments.runner import processes
-from tunnel_reference import draw, severity
 from tunnel_reference.draw import Mixture
 from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
 from tunnel_sim.vocabulary.errors import TunnelError
+
+SET = {
+    "count": 3, "seed": 5, "shares": {"single": 2.0, "none": 1.0}, "mixture": Mixture(variety=0.0, small=0.0),
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     """Three campaigns of four short runs, made once; tests copy it."""
-    c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4, sample_rate=250.0)
     folder = tmp_path_factory.mktemp("blind") / "set"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(draw, "draw_conditions", lambda _rng: c)
-        patch.setattr(severity, "_SUBSTEPS", 2)  # the motions need not be exact
-        make_blind(
-            folder,
-            count=3,
-            seed=5,
-            shares={"single": 2.0, "none": 1.0},
-            mixture=Mixture(variety=0.0, small=0.0),
-        )
+    with short_campaigns():
+        make_blind(folder, **SET)
     return folder
 
 
-def test_scatter_is_in_the_key_and_what_is_known_of_it_in_the_campaigns(tmp_path, monkeypatch):
-    c = rig((21.02, 67.98, 21.02), (0.0, 0.0, 25.0), (0.35,) * 3, sample_rate=250.0)
-    monkeypatch.setattr(draw, "draw_conditions", lambda _rng: c)
-    monkeypatch.setattr(severity, "_SUBSTEPS", 2)
+def test_scatter_is_in_the_key_and_what_is_known_of_it_in_the_campaigns(tmp_path):
     mixture = Mixture(textbook=1.0, variety=0.0, scatter=1.0, level="usual", stated=1.0)
-    key = make_blind(tmp_path / "set", count=2, seed=5, shares={"none": 1.0}, mixture=mixture)
+    with short_campaigns(runs=3):
+        key = make_blind(tmp_path / "set", count=2, seed=5, shares={"none": 1.0}, mixture=mixture)
     document = json.loads(key.read_text())
     assert {document["made_with"][name] for name in ("scatter", "scatter_level", "stated")} == {1.0, "usual"}
     for name, truth in document["truths"].items():
@@ -115,14 +106,9 @@ def test_the_published_hash_is_that_of_the_salted_key(blind):
     assert hashlib.sha256(other).hexdigest() != seal["key_sha256"]
 
 
-def test_the_same_seed_gives_the_same_campaigns_under_another_salt(made, tmp_path, monkeypatch):
-    c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4, sample_rate=250.0)
-    monkeypatch.setattr(draw, "draw_conditions", lambda _rng: c)
-    monkeypatch.setattr(severity, "_SUBSTEPS", 2)
-    key = make_blind(
-        tmp_path / "b", count=3, seed=5, shares={"single": 2.0, "none": 1.0},
-        mixture=Mixture(variety=0.0, small=0.0), key=tmp_path / "away.json",
-    )  # fmt: skip
+def test_the_same_seed_gives_the_same_campaigns_under_another_salt(made, tmp_path):
+    with short_campaigns():
+        key = make_blind(tmp_path / "b", **SET, key=tmp_path / "away.json")
     assert key == tmp_path / "away.json"
     assert not (tmp_path / "b" / "key.json").exists()
     one, two = (json.loads(p.read_text()) for p in (made / "key.json", key))
@@ -135,16 +121,6 @@ def test_the_same_seed_gives_the_same_campaigns_under_another_salt(made, tmp_pat
         )
 
 
-def test_an_interrupted_making_leaves_nothing(tmp_path, monkeypatch):
-    def interrupted(*_args, **_kwargs):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("tunnel_lab.experiments.blind.sets.simulate_set", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        make_blind(tmp_path / "set", count=1, seed=1)
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_campaign_that_the_reader_refuses_is_drawn_again(tmp_path, monkeypatch):
     written = []
 
@@ -155,12 +131,8 @@ def test_a_campaign_that_the_reader_refuses_is_drawn_again(tmp_path, monkeypatch
         return write_campaign(campaign, folder)
 
     monkeypatch.setattr("tunnel_lab.experiments.blind.sets.write_campaign", refuses_the_first)
-    c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4, sample_rate=250.0)
-    monkeypatch.setattr(draw, "draw_conditions", lambda _rng: c)
-    monkeypatch.setattr(severity, "_SUBSTEPS", 2)
-    key = make_blind(
-        tmp_path / "set", count=1, seed=5, shares={"single": 1.0}, mixture=Mixture(variety=0.0, small=0.0)
-    )
+    with short_campaigns():
+        key = make_blind(tmp_path / "set", **SET | {"count": 1, "shares": {"single": 1.0}})
     first, second = (campaign.runs[0].record.yaw_rad for campaign in written)
     assert not np.array_equal(first, second)
     assert np.array_equal(read_campaign(tmp_path / "set" / "c0001").runs[0].record.yaw_rad, second)
@@ -170,33 +142,6 @@ def test_a_campaign_that_the_reader_refuses_is_drawn_again(tmp_path, monkeypatch
 def test_a_set_is_not_made_over_another(blind):
     with pytest.raises(TunnelError, match="exists already"):
         make_blind(blind, count=1, seed=1)
-
-
-def test_answering_goes_on_where_it_was_interrupted(blind, quick, monkeypatch):
-    whole = answer.diagnose
-
-    def second_time(campaign, kinds):
-        if len(quick) == 1:
-            raise KeyboardInterrupt
-        return whole(campaign, kinds)
-
-    monkeypatch.setattr(answer, "diagnose", second_time)
-    with pytest.raises(KeyboardInterrupt):
-        answer_set(blind)
-    assert [name for name, _ in quick] == ["c0001"]
-    first = (blind / "answers" / "c0001.json").read_bytes()
-    steps = []
-    monkeypatch.setattr(answer, "diagnose", whole)
-    answer_set(blind, progress=lambda *args: steps.append(args))
-    assert [name for name, _ in quick] == ["c0001", "c0002", "c0003"]
-    assert (blind / "answers" / "c0001.json").read_bytes() == first
-    assert steps == [(1, 3), (2, 3), (3, 3)]
-    assert {p.name for p in (blind / "answers").iterdir()} == {
-        "c0001.json",
-        "c0002.json",
-        "c0003.json",
-        "seal.json",
-    }
 
 
 @pytest.mark.usefixtures("quick")
@@ -215,20 +160,6 @@ def test_a_campaign_that_cannot_be_diagnosed_is_a_wrong_answer(blind, monkeypatc
     assert score.exact()["all"] == Proportion(0, 3)
     assert {name for row in score.confusion().values() for name in row} == {"no answer"}
     assert "do not help" in (blind / "answers" / "c0002.json").read_text()
-
-
-@pytest.mark.slow
-def test_processes_give_the_answers_of_one(blind, monkeypatch):
-    monkeypatch.setenv("OMP_NUM_THREADS", "1")
-    exclude = ("buffeting",)
-    alone = [
-        json.loads(answer.answer_campaign(blind / name, exclude).files["answers"])["causes"]
-        for name in ("c0001", "c0002", "c0003")
-    ]
-    answer_set(blind, excluded=exclude, workers=processes(2))
-    folder = answers_folder(blind, exclude)
-    assert folder.name == "answers-without-buffeting"
-    assert [json.loads((folder / f"c000{i}.json").read_text())["causes"] for i in (1, 2, 3)] == alone
 
 
 @pytest.mark.usefixtures("quick")
