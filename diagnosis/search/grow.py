@@ -21,7 +21,7 @@ one."""
 
 
 @dataclass(frozen=True, eq=False)
-class Grown:
+class GrownLevel:
     """What has been grown up to a size.
 
     Args:
@@ -33,7 +33,7 @@ class Grown:
     level: tuple[Hypothesis, ...]
 
 
-def levels(view: RunsInView, progress: Progress | None = None) -> Iterator[Grown]:
+def levels(view: RunsInView, progress: Progress | None = None) -> Iterator[GrownLevel]:
     """Add effects one at a time to the best few sets of each size, in a view of the runs.
 
     Args:
@@ -55,8 +55,8 @@ def levels(view: RunsInView, progress: Progress | None = None) -> Iterator[Grown
     yield _grown(found, level)
 
 
-def _grown(found: Mapping[tuple[str, ...], Hypothesis], level: Sequence[Hypothesis]) -> Grown:
-    return Grown(tuple(sorted(found.values(), key=lambda h: h.fit.total)), tuple(level))
+def _grown(found: Mapping[tuple[str, ...], Hypothesis], level: Sequence[Hypothesis]) -> GrownLevel:
+    return GrownLevel(tuple(sorted(found.values(), key=lambda h: h.fit.total)), tuple(level))
 
 
 def grow(view: RunsInView, progress: Progress | None = None) -> list[Hypothesis]:
