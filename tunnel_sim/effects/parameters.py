@@ -129,10 +129,16 @@ def exponent(symbol: str, meaning: str, textbook: float, fit_lower: float = -inf
 EQUATION = "(1 − e^(−k t/T))/(1 − e^(−k))"
 
 
-def settling() -> Any:
-    """The form parameter of a drift: run length over the time constant; 0: linear, the textbook form."""
-    meaning = "length of the run over the drift's time constant"
-    return parameter("k", "1", meaning, scale=1.0, lower=-30.0, upper=30.0, form=True, along_run=True)
+def settling(fit_upper: float = inf) -> Any:
+    """The form parameter of a drift: run length over the time constant; 0: linear, the textbook form.
+
+    Args:
+        fit_upper: greatest value a fit may take, dimensionless.
+    """
+    return parameter(
+        "k", "1", "length of the run over the drift's time constant",
+        scale=1.0, lower=-30.0, upper=30.0, form=True, along_run=True, fit_upper=fit_upper,
+    )  # fmt: skip
 
 
 _LINEAR = 1e-3  # rate below which the first two terms of the mean's series are exact to 1e-12
