@@ -56,6 +56,7 @@ class Problem:
             for info in kind.parameters():
                 name = f"{kind.name}.{info.name}"
                 free = not info.of_input and (not info.form or name in self.free_forms)
+                free &= not info.with_spring or held.get(f"{kind.name}.{info.with_spring}", 0.0) > 0.0
                 if free and name not in held and self.data.model.tells(info, swing):
                     low, high = info.fit_range(swing)
                     found.append(Parameter(name, info.unit, low, high, info.scale, effect=kind.name))

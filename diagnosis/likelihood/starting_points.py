@@ -254,8 +254,7 @@ def _added_beside_scatter(base: Fit, between: Between, change: list[Array]) -> _
 
 def _tried(base: Fit, kind: type[Effect], trial: Trial) -> Problem:
     """A problem with one more effect, with the parameters that a trial fixes and frees."""
-    spring = kind.chosen_spring()
-    held = {} if spring is None else {spring: trial.values[spring]}
+    held = {spring: trial.values.get(spring, 0.0) for spring in kind.chosen_springs()}
     fixed = (*base.problem.fixed, *((f"{kind.name}.{name}", value) for name, value in held.items()))
     freed = next((form for form in kind.forms() if any(name in trial.values for name in form)), ())
     free_forms = (*base.problem.free_forms, *(f"{kind.name}.{name}" for name in freed))

@@ -41,6 +41,8 @@ class ParameterInfo:
         chosen_spring: whether it is the stiffness of one of the campaign's springs: chosen, not fitted.
         per_pressure: whether it multiplies ½ρV²Al, so that its unit depends on which sizes are stated.
         inside: whether a fit at one of its bounds calls for another law, as with a free exponent.
+        with_spring: name of the parameter that is the spring it belongs to, where the effect has several: it is free
+            where that spring is chosen, and counts as a further cause; empty: none.
         of_input: whether it relates the effect to the input of a driven run; values are tried and not fitted. Free
             decays do not depend on it.
         along_run: whether it shapes a change along the run.
@@ -64,6 +66,7 @@ class ParameterInfo:
     rate_exponent: str = ""
     beside_spring: bool = False
     chosen_spring: bool = False
+    with_spring: str = ""
     per_pressure: bool = False
     inside: bool = False
     of_input: bool = False
