@@ -322,6 +322,7 @@ class WindSpeedDrift(Effect):
     time_constant: float = parameter(
         "τ", "s", "time constant of a wind that settles to its stated speed; 0: it drifts as stated by k",
         scale=2.0, lower=0.0, upper=1e6, fit_lower=0.05, fit_upper=20.0, form=True, along_run=True,
+        own_law=True,
     )  # fmt: skip
 
     @classmethod

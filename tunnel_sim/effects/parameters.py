@@ -46,6 +46,8 @@ class ParameterInfo:
         of_input: whether it relates the effect to the input of a driven run; values are tried and not fitted. Free
             decays do not depend on it.
         along_run: whether it shapes a change along the run.
+        own_law: whether its form is a law of its own, and not a departure from the textbook's: coefficients beside the
+            two then refer to different conditions, and do not show how much the form matters.
         of_load: whether it relates the effect to the moment that the joint carries; it can be fitted only where
             gravity or an actuator makes this moment vary.
         relative: whether it is a relative change, which people read in per cent; its unit is ``1``.
@@ -71,6 +73,7 @@ class ParameterInfo:
     inside: bool = False
     of_input: bool = False
     along_run: bool = False
+    own_law: bool = False
     of_load: bool = False
     relative: bool = False
     name: str = ""
