@@ -5,7 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from tunnel_reference import moments as m
-from tunnel_reference.catalogue import Draw, Extra, Form, Group, calibration, flexible_rod, inertia_by_spring, moving, one_spring
+from tunnel_reference.catalogue import (
+    Draw,
+    Extra,
+    Form,
+    Group,
+    calibration,
+    flexible_rod,
+    inertia_by_spring,
+    moving,
+    one_spring,
+)
 from tunnel_reference.integrator import Phase
 from tunnel_reference.true_conditions import Array, TrueConditions
 

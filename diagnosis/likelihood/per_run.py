@@ -68,7 +68,7 @@ def ringing(fit: Fit) -> Sought | None:
         frequency is distinct from the motion.
 
     A run does not count where the frequency does not beat with its own motion, or is a multiple of it. At least
-    half of the runs must count: springs and winds differ, so a line at the motion of one run is distinct in another.
+    half of the runs must count: springs and winds differ, so a line at the motion of one run is apart in another.
     """
     runs = fit.problem.data.runs
     step = 1.0 / (_RINGING_PADDING * max(run.duration for run in runs))

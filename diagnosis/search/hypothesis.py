@@ -130,7 +130,9 @@ class Hypothesis:
     def further_causes(self) -> int:
         """Numbers of springs beyond the first of their effect: each could be a cause by itself."""
         problem = self.fit.problem
-        further = (f"{kind.name}.{i.name}" for kind in problem.effects for i in kind.parameters() if i.with_spring)
+        further = (
+            f"{kind.name}.{i.name}" for kind in problem.effects for i in kind.parameters() if i.with_spring
+        )
         return sum(name in problem.names for name in further)
 
     @property

@@ -51,7 +51,7 @@ class FittedSet:
         outside: whether it is from outside the vocabulary: its probability is added to ``unknown``.
         scatter_cost: −2 ln of the evidence of its chance differences between runs, dimensionless.
         shown_between_runs: number of its effects that only the comparison of runs shows.
-        further_causes: numbers of springs beyond the first of their effect, each of which costs as much as an effect.
+        further_causes: numbers of springs beyond the first of their effect, each of which costs as an effect.
     """
 
     effects: tuple[str, ...]

@@ -151,7 +151,9 @@ def _other_spring(p: Parameters, run: Setting) -> Moment:
 
 def _other_inertia(p: Parameters, run: Setting) -> Moment:
     base, hit = nominal(run.spring, run.speed), abs(p["first_spring"] - run.spring) < 1e-6
-    return lambda t, b, r: base(t, b, r) / (1.0 + p["first"] * hit)  # as the inertia of the oracle is the stated one
+    return lambda t, b, r: (
+        base(t, b, r) / (1.0 + p["first"] * hit)
+    )  # as the inertia of the oracle is the stated one
 
 
 def _drifting(p: Parameters, run: Setting) -> Moment:

@@ -27,7 +27,7 @@ HARMONICS = (2.0, 3.0)
 """Multiples of the motion's frequency at which its harmonics lie."""
 
 _NEAREST_MODE = 0.04  # of the motion's frequency: judgement; nearer, a nonlinear spring does the same
-_LEAST_BEATS = 1.0  # of two modes while both last: fewer do not distinguish them from one; judgement
+_LEAST_BEATS = 0.5  # of two modes while both last: then they have been in phase and opposed; judgement
 
 REFERENCE_RELEASE = 0.35
 """Release at which all forms of a second mode have the same amplitude, rad."""

@@ -45,9 +45,7 @@ class InertiaBySpring(Effect):
     channel = "calibration"
     condition = "always"
     advice = "Weigh the adapters and clamps, and state Izz for every spring"
-    equation = (
-        "(1 + x1) Izz instead of Izz in the runs of the spring Kr1; the same with x2 and Kr2, x3 and Kr3, x4 and Kr4"
-    )
+    equation = "(1 + x1) Izz instead of Izz in the runs of the spring Kr1; the same with x2 and Kr2, x3 and Kr3, x4 and Kr4"
     signature = (
         "With the wind off the same as a wrong spring; with the wind on the stiffness of the air, too, acts on the "
         "other inertia, which no error of a spring does."
@@ -92,9 +90,9 @@ class InertiaBySpring(Effect):
         found = []
         for first in springs:
             _, *others = (spring for spring in springs if spring != first)
-            named = zip(_NAMES, (first, *others), strict=False)
-            chosen = {key: value for name, spring in named for key, value in _starting(name, spring)}
-            found.append(Trial(chosen | {"first": _SCALE}, "first"))
+            named = dict(zip(_NAMES, (first, *others), strict=False))
+            chosen = {f"{name}_spring": spring for name, spring in named.items()}
+            found.append(Trial(chosen | {"first": _SCALE}, "first", beside=tuple(named)[1:]))
         return found
 
     @classmethod
@@ -109,7 +107,3 @@ class InertiaBySpring(Effect):
             apart = np.abs(spring - its)
             concerned = (its > 0.0) & (apart <= SPRING_TOLERANCE * np.maximum(np.abs(spring), its))
             runs["yaw_inertia"][concerned] *= 1.0 + cls.column(effects, name)[concerned]
-
-
-def _starting(name: str, spring: float) -> tuple[tuple[str, float], ...]:
-    return (name, 0.0), (f"{name}_spring", spring)

@@ -196,6 +196,7 @@ class Trial:
 
     Args:
         at_most: greatest absolute value that linear theory may give it, in its unit.
+        beside: further parameters that linear theory sets together with the scaled one; they start at 0.
         second_order: whether the nominal coefficients absorb its first order, so that its square shows.
         passive: whether a passive part can have this sign; an upper limit is stated for such a sign alone.
     """
@@ -204,6 +205,7 @@ class Trial:
     scaled: str | None
     at_most: float = inf
     replaces: str | None = None
+    beside: tuple[str, ...] = ()
     second_order: bool = False
     passive: bool = True
 
