@@ -45,7 +45,10 @@ class InertiaBySpring(Effect):
     channel = "calibration"
     condition = "always"
     advice = "Weigh the adapters and clamps, and state Izz for every spring"
-    equation = "(1 + x1) Izz instead of Izz in the runs of the spring Kr1; the same with x2 and Kr2, x3 and Kr3, x4 and Kr4"
+    equation = (
+        "(1 + x1) Izz instead of Izz in the runs of the spring Kr1; the same with x2 and Kr2, x3 and Kr3, "
+        "x4 and Kr4"
+    )
     signature = (
         "With the wind off the same as a wrong spring; with the wind on the stiffness of the air, too, acts on the "
         "other inertia, which no error of a spring does."

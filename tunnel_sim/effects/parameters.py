@@ -41,13 +41,13 @@ class ParameterInfo:
         chosen_spring: whether it is the stiffness of one of the campaign's springs: chosen, not fitted.
         per_pressure: whether it multiplies ½ρV²Al, so that its unit depends on which sizes are stated.
         inside: whether a fit at one of its bounds calls for another law, as with a free exponent.
-        with_spring: name of the parameter that is the spring it belongs to, where the effect has several: it is free
-            where that spring is chosen, and counts as a further cause; empty: none.
+        with_spring: name of the parameter that is the spring it belongs to, where the effect has several: it is
+            free where that spring is chosen, and counts as a further cause; empty: none.
         of_input: whether it relates the effect to the input of a driven run; values are tried and not fitted. Free
             decays do not depend on it.
         along_run: whether it shapes a change along the run.
-        own_law: whether its form is a law of its own, and not a departure from the textbook's: coefficients beside the
-            two then refer to different conditions, and do not show how much the form matters.
+        own_law: whether its form is a law of its own, and not a departure from the textbook's: coefficients beside
+            the two then refer to different conditions, and do not show how much the form matters.
         of_load: whether it relates the effect to the moment that the joint carries; it can be fitted only where
             gravity or an actuator makes this moment vary.
         relative: whether it is a relative change, which people read in per cent; its unit is ``1``.
