@@ -86,7 +86,7 @@ def test_a_spring_that_no_run_has_is_refused():
 def test_its_size_is_said_spring_by_spring():
     kind = effect_class("inertia_by_spring")
     values = {"first": 0.004, "first_spring": 16.12, "second": -0.003, "second_spring": 44.84}
-    text = lambda value, std, unit: f"{value:.2f} {unit}"  # noqa: E731
+    text = lambda value, _std, unit: f"{value:.2f} {unit}"  # noqa: E731
     said = kind.phrase(values, dict.fromkeys(values), text)
     assert said == "an inertia that differs by spring: 0.40 % with 16.12 N m/rad, -0.30 % with 44.84 N m/rad"
     assert not effect_from("inertia_by_spring", {"second": 0.1, "second_spring": 16.12}).is_null
