@@ -74,6 +74,14 @@ class Problem:
         """Names of the free effect parameters, as ``effect.parameter``."""
         return tuple(one.name for one in self.parameters.common if one.effect)
 
+    @cached_property
+    def further_causes(self) -> int:
+        """Numbers of springs beyond the first of their effect: each could be a cause by itself."""
+        further = (
+            f"{kind.name}.{i.name}" for kind in self.effects for i in kind.parameters() if i.with_spring
+        )
+        return sum(name in self.names for name in further)
+
     @property
     def bounds(self) -> tuple[Array, Array]:
         """Least and greatest values of the common parameters."""

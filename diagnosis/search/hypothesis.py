@@ -127,15 +127,6 @@ class Hypothesis:
         return numbers
 
     @property
-    def further_causes(self) -> int:
-        """Numbers of springs beyond the first of their effect: each could be a cause by itself."""
-        problem = self.fit.problem
-        further = (
-            f"{kind.name}.{i.name}" for kind in problem.effects for i in kind.parameters() if i.with_spring
-        )
-        return sum(name in problem.names for name in further)
-
-    @property
     def under_load(self) -> bool:
         """Whether it is one effect alone that may grow with the moment of an actuator.
 
@@ -188,7 +179,7 @@ class Hypothesis:
         share = (self.fit.excess + by_chance) / nominal.gap
         cost = self.fit.scatter_cost(gap.deviation_precision)
         between = self.fit.shown_between_runs
-        numbers, causes = self.further_numbers, self.further_causes
+        numbers, causes = self.further_numbers, self.fit.problem.further_causes
         return FittedSet(self.effects, share, self.excess, numbers, outside, cost, between, causes)
 
 
@@ -246,7 +237,7 @@ class Scale:
         self, left: Array, of: Hypothesis, *, effects: int = 0, numbers: int = 0, scatter_cost: float = 0.0
     ) -> float:
         """Logarithm of the weight of a set with a misfit ``left`` and further effects and parameters."""
-        count = len(of.effects) + of.further_causes + effects
+        count = len(of.effects) + of.fit.problem.further_causes + effects
         further = of.further_numbers + numbers
         costs = scatter_cost, self.scatter_cost
         return log_weight(left, self.misfit, count, further, self.chosen, costs, of.fit.shown_between_runs)

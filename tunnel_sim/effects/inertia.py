@@ -37,7 +37,7 @@ def _spring(which: str, symbol: str) -> Any:
 class InertiaBySpring(Effect):
     """An inertia that differs from spring to spring, because each has its own adapter or clamp.
 
-    The springs that are not named have the campaign's Izz; a fit names all but one.
+    The springs that are not named have the campaign's Izz; a fit names all but one, or one.
     """
 
     name = "inertia_by_spring"
@@ -55,7 +55,7 @@ class InertiaBySpring(Effect):
     )
     references = ("Ewins, Modal Testing: Theory, Practice and Application, Research Studies Press 2000",)
     example = (0.004, 16.12)
-    tries = 2
+    tries = 3
     caveat = "Izz is the inertia with the spring that is not named."
 
     first: float = _difference("first", "x1")
@@ -86,14 +86,14 @@ class InertiaBySpring(Effect):
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
-        """Each spring as the one that differs most, and all others but one; none where the springs are too many."""
+        """All springs but one, and each alone; none where the springs are too many."""
         springs = campaign.springs
         if not 1 < len(springs) <= len(_NAMES) + 1 or campaign.normalised:
             return ()
+        groups = [springs[1:]] if len(springs) > 2 else []
         found = []
-        for first in springs:
-            _, *others = (spring for spring in springs if spring != first)
-            named = dict(zip(_NAMES, (first, *others), strict=False))
+        for group in (*groups, *((spring,) for spring in springs)):
+            named = dict(zip(_NAMES, group, strict=False))
             chosen = {f"{name}_spring": spring for name, spring in named.items()}
             found.append(Trial(chosen | {"first": _SCALE}, "first", beside=tuple(named)[1:]))
         return found
