@@ -179,7 +179,8 @@ class Hypothesis:
         share = (self.fit.excess + by_chance) / nominal.gap
         cost = self.fit.scatter_cost(gap.deviation_precision)
         between = self.fit.shown_between_runs
-        return FittedSet(self.effects, share, self.excess, self.further_numbers, outside, cost, between)
+        numbers, causes = self.further_numbers, self.fit.problem.further_causes
+        return FittedSet(self.effects, share, self.excess, numbers, outside, cost, between, causes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,7 +216,7 @@ class Scale:
         """Logarithm of the weight of a set whose misfit is known."""
         costs, left = (given.scatter_cost, self.scatter_cost), given.excess - self.least
         return log_weight(
-            left, self.misfit, len(given.effects), given.numbers, self.chosen, costs, given.shown_between_runs
+            left, self.misfit, given.causes, given.numbers, self.chosen, costs, given.shown_between_runs
         )
 
     def greatest(self, hypothesis: Hypothesis, *, repeating: bool = True) -> float:
@@ -236,7 +237,8 @@ class Scale:
         self, left: Array, of: Hypothesis, *, effects: int = 0, numbers: int = 0, scatter_cost: float = 0.0
     ) -> float:
         """Logarithm of the weight of a set with a misfit ``left`` and further effects and parameters."""
-        count, further = len(of.effects) + effects, of.further_numbers + numbers
+        count = len(of.effects) + of.fit.problem.further_causes + effects
+        further = of.further_numbers + numbers
         costs = scatter_cost, self.scatter_cost
         return log_weight(left, self.misfit, count, further, self.chosen, costs, of.fit.shown_between_runs)
 
@@ -437,15 +439,24 @@ def polish(chosen: Hypothesis) -> Hypothesis:
     if better is None or better.total > first.total:
         better = first
     better = deepest(better, tolerance=_POLISH)
-    textbook = None
-    if better.problem.free_forms and not first.problem.free_forms:
+    textbook, departs = None, bool(better.problem.free_forms) and not _own_law(better.problem)
+    if departs and not first.problem.free_forms:
         textbook = first
-    elif better.problem.free_forms:
+    elif departs:
         problem = dataclasses.replace(better.problem, free_forms=())
         values = dict(zip(better.problem.names, better.point.common.tolist(), strict=True))
         start = Point(np.array([values[name] for name in problem.names]), better.point.per_run)
         textbook = try_fit(problem, start)
     return Hypothesis(chosen.effects, better, textbook)
+
+
+def _own_law(problem: Problem) -> bool:
+    """Whether a freed form is a law of its own, with which the textbook's coefficients cannot be compared."""
+    return any(
+        info.own_law and f"{kind.name}.{info.name}" in problem.free_forms
+        for kind in problem.effects
+        for info in kind.parameters()
+    )
 
 
 def _first_forms(fitted: Fit) -> tuple[Form, ...]:

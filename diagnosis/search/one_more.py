@@ -12,7 +12,7 @@ from diagnosis.likelihood.residuals import gap_left, misfit
 from diagnosis.likelihood.starting_points import StartingPoint, misses_motion, starting_points
 from diagnosis.search.clock import Progress
 from diagnosis.search.hypothesis import Hypothesis, is_plausible, of_more_weight, own_gain, turned_back
-from diagnosis.search.scatter import likelier, with_likeliest_widths
+from diagnosis.search.scatter import likelier, with_likeliest_widths, with_own_linear_terms
 from diagnosis.search.weigh import log_weight, misfit_scale
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.capabilities import SecondOscillation
@@ -40,11 +40,16 @@ def second_mode_alone(nominal: Fit, kinds: Sequence[type[Effect]]) -> Hypothesis
     """The second mode, where the nominal model misses the motion because it has only one mode.
 
     Returns:
-        The fit with the mode added; None where it misses the motion too, or may not be tried.
+        The fit with the mode added; None where it misses the motion too, where a frequency and a damping of every
+        run explain as much, or where it may not be tried.
     """
     modes = [kind for kind in kinds if issubclass(kind, SecondOscillation)]
     found = sets_with_one_more([Hypothesis((), nominal)], modes)
-    return found[0] if found and not misses_motion(found[0].fit) else None
+    if not found or misses_motion(found[0].fit):
+        return None
+    own = with_own_linear_terms(nominal, kinds)
+    one_mode = None if own is None else try_fit(*own)
+    return None if one_mode is not None and one_mode.total < found[0].fit.total else found[0]
 
 
 def same_change(one: Fit, other: Fit, nominal: Fit) -> bool:
@@ -78,12 +83,18 @@ def sets_with_one_more(
                 near = [point for start in starts if (point := start.nearer()) is not None]
                 tried += [fitted for start in near if (fitted := _fitted(start, base)) is not None]
             there = filter(is_plausible, map(turned_back, tried))
-            best = min(there, key=lambda fitted: fitted.unlikelihood, default=None)
+            best = min(there, key=_unlikelihood, default=None)
             if best is not None:
-                best = likelier(best, _repeating(parent, kind)) if parent.repeating is not None else best
+                if parent.repeating is not None:
+                    best = likelier(best, _repeating(parent, kind, best.problem.further_causes))
                 child = Hypothesis((*parent.effects, kind.name), best)
                 sets[child.names] = of_more_weight(sets.get(child.names), child, gap_left(base))
     return list(sets.values())
+
+
+def _unlikelihood(fitted: Fit) -> float:
+    """−2 ln of the likelihood, with the least drop for every number that could be a cause by itself."""
+    return fitted.unlikelihood + LEAST_DROP * fitted.problem.further_causes
 
 
 def _worth_fitting(
@@ -118,12 +129,17 @@ def _worth_fitting(
     return [item for i, item in enumerate(scored) if i < ALWAYS_FITTED or item[1][0].predicted_drop > limit]
 
 
-def _repeating(parent: Hypothesis, kind: type[Effect]) -> Fit | None:
-    """The set with one more effect, fitted to runs that repeat exactly; the best from its starting points."""
+def _repeating(parent: Hypothesis, kind: type[Effect], further_causes: int) -> Fit | None:
+    """The set with one more effect, fitted to runs that repeat exactly; the best from its starting points.
+
+    Args:
+        further_causes: of the set that it is compared with.
+    """
     base = parent.repeating
     if base is None:
         return None
-    starts = starting_points(base, kind)[: kind.tries]
+    found = starting_points(base, kind)
+    starts = [start for start in found if start.problem.further_causes == further_causes][: kind.tries]
     tried = [fitted for start in starts if (fitted := _fitted(start, base)) is not None]
     there = filter(is_plausible, map(turned_back, tried))
     return min(there, key=lambda fitted: fitted.total, default=None)

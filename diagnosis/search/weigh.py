@@ -51,6 +51,7 @@ class FittedSet:
         outside: whether it is from outside the vocabulary: its probability is added to ``unknown``.
         scatter_cost: −2 ln of the evidence of its chance differences between runs, dimensionless.
         shown_between_runs: number of its effects that only the comparison of runs shows.
+        further_causes: numbers of springs beyond the first of their effect, each of which costs as an effect.
     """
 
     effects: tuple[str, ...]
@@ -60,6 +61,12 @@ class FittedSet:
     outside: bool = False
     scatter_cost: float = 0.0
     shown_between_runs: int = 0
+    further_causes: int = 0
+
+    @property
+    def causes(self) -> int:
+        """Number of effects, with the further causes."""
+        return len(self.effects) + self.further_causes
 
 
 def weigh(
@@ -92,7 +99,7 @@ def weigh(
             log_weight(
                 s.excess - least,
                 scale,
-                len(key),
+                s.causes,
                 s.numbers,
                 chosen,
                 (s.scatter_cost, nominal.scatter_cost),

@@ -87,6 +87,8 @@ VARIANTS: list[tuple[str, dict[str, float], Setting]] = [
     ("rod_flexibility", {"compliance": 1e-5, "inertia_share": 0.1}, replace(RUN, spring=44.84)),
     ("nonlinear_yaw_moment", {"coefficient": -3.0}, RUN),
     ("wind_speed_drift", {"drift": -0.2}, RUN),
+    ("wind_speed_drift", {"drift": 0.1, "time_constant": 0.8}, RUN),
+    ("wind_speed_drift", {"drift": -0.05, "time_constant": 5.0}, RUN),
     ("nonlinear_yaw_damping", {"coefficient": -20.0}, RUN),
     ("unsteady_aero_lag", {"lag": 0.01}, RUN),  # a third of a step
     ("unsteady_aero_lag", {"lag": 15.0}, RUN),
@@ -96,6 +98,8 @@ VARIANTS: list[tuple[str, dict[str, float], Setting]] = [
     ("sensor_hysteresis", {"half_width": 0.01}, replace(RUN, release=-0.1)),
     ("sensor_drift", {"drift": -0.01}, RUN),
     ("spring_miscalibration", {"error": -0.1, "spring_stiffness": 16.12}, RUN),
+    ("inertia_by_spring", {"first": -0.1, "first_spring": 16.12}, RUN),
+    ("inertia_by_spring", {"first": 0.1, "first_spring": 44.84}, replace(RUN, spring=44.84)),
     ("wind_speed_offset", {"offset": -1.5}, RUN),
     ("reynolds_dependence", {"per_e_fold": -0.3}, replace(RUN, speed=8.0)),
     ("stiffness_scatter", {"spread": 0.05}, replace(RUN, speed=0.0)),

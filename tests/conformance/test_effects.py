@@ -206,7 +206,7 @@ def test_mechanical_damping_takes_energy_in_every_fit(kind: type[Effect]) -> Non
 def test_only_a_second_mode_may_be_the_motion_itself(kind: type[Effect]) -> None:
     implausible = [ratio for ratio in (0.5, 0.9, 1.0, 1.2, 1.5, 1.9, 2.2, 3.1, 3.5, 6.0)
                    if not example(kind).plausible(EXAMPLE_FREQUENCY / ratio, 60.0)]  # fmt: skip
-    assert implausible == ([0.9, 1.0, 1.2] if kind.name == "second_mode" else [])
+    assert implausible == ([1.0] if kind.name == "second_mode" else [])
 
 
 @each_effect
@@ -221,7 +221,7 @@ def test_a_run_changes_beside_others_as_alone(kind: type[Effect]) -> None:
     ]
     runs = [replace(WIND_ON, wind_speed=10.0 * n, spring_stiffness=16.0 + n) for n in range(len(effects))]
     runs[3] = effect_laws.stated(kind, runs[3])
-    if (spring := kind.chosen_spring()) is not None:
+    for spring in kind.chosen_springs()[:1]:
         effects[1] = replace(effects[1], **{spring: 17.0})
     draws = [effect.draw(run, np.random.default_rng(7)) for effect, run in zip(effects, runs, strict=True)]
     together = with_effects(SettingsTable.of(runs), [(one,) for one in effects], [(one,) for one in draws])

@@ -41,9 +41,13 @@ class ParameterInfo:
         chosen_spring: whether it is the stiffness of one of the campaign's springs: chosen, not fitted.
         per_pressure: whether it multiplies ½ρV²Al, so that its unit depends on which sizes are stated.
         inside: whether a fit at one of its bounds calls for another law, as with a free exponent.
+        with_spring: name of the parameter that is the spring it belongs to, where the effect has several: it is
+            free where that spring is chosen, and counts as a further cause; empty: none.
         of_input: whether it relates the effect to the input of a driven run; values are tried and not fitted. Free
             decays do not depend on it.
         along_run: whether it shapes a change along the run.
+        own_law: whether its form is a law of its own, and not a departure from the textbook's: coefficients beside
+            the two then refer to different conditions, and do not show how much the form matters.
         of_load: whether it relates the effect to the moment that the joint carries; it can be fitted only where
             gravity or an actuator makes this moment vary.
         relative: whether it is a relative change, which people read in per cent; its unit is ``1``.
@@ -64,10 +68,12 @@ class ParameterInfo:
     rate_exponent: str = ""
     beside_spring: bool = False
     chosen_spring: bool = False
+    with_spring: str = ""
     per_pressure: bool = False
     inside: bool = False
     of_input: bool = False
     along_run: bool = False
+    own_law: bool = False
     of_load: bool = False
     relative: bool = False
     name: str = ""
@@ -129,10 +135,16 @@ def exponent(symbol: str, meaning: str, textbook: float, fit_lower: float = -inf
 EQUATION = "(1 − e^(−k t/T))/(1 − e^(−k))"
 
 
-def settling() -> Any:
-    """The form parameter of a drift: run length over the time constant; 0: linear, the textbook form."""
-    meaning = "length of the run over the drift's time constant"
-    return parameter("k", "1", meaning, scale=1.0, lower=-30.0, upper=30.0, form=True, along_run=True)
+def settling(fit_upper: float = inf) -> Any:
+    """The form parameter of a drift: run length over the time constant; 0: linear, the textbook form.
+
+    Args:
+        fit_upper: greatest value a fit may take, dimensionless.
+    """
+    return parameter(
+        "k", "1", "length of the run over the drift's time constant",
+        scale=1.0, lower=-30.0, upper=30.0, form=True, along_run=True, fit_upper=fit_upper,
+    )  # fmt: skip
 
 
 _LINEAR = 1e-3  # rate below which the first two terms of the mean's series are exact to 1e-12
@@ -184,6 +196,7 @@ class Trial:
 
     Args:
         at_most: greatest absolute value that linear theory may give it, in its unit.
+        beside: further parameters that linear theory sets together with the scaled one; they start at 0.
         second_order: whether the nominal coefficients absorb its first order, so that its square shows.
         passive: whether a passive part can have this sign; an upper limit is stated for such a sign alone.
     """
@@ -192,6 +205,7 @@ class Trial:
     scaled: str | None
     at_most: float = inf
     replaces: str | None = None
+    beside: tuple[str, ...] = ()
     second_order: bool = False
     passive: bool = True
 
