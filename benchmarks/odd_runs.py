@@ -210,7 +210,7 @@ def _plan(rng: np.random.Generator, name: str, number: int) -> CampaignPlan:
         names = [one.name for one in kind.parameters()]
         values = dict(zip(names, kind.example, strict=False))
         values[names[0]] *= float(np.exp(rng.uniform(*np.log(_SIZES))))
-        for spring in kind.chosen_springs()[:1]:
+        if spring := kind.chosen_spring():
             values[spring] = springs[int(rng.integers(2))]
         effects.append(EffectSetting(kind.name, values))
     return CampaignPlan(

@@ -118,14 +118,6 @@ def one_spring(p: float, extra: Extra, c: TrueConditions) -> TrueConditions:
     return replace(c, stiffness_scale=np.where(c.spring_stiffness == chosen, 1.0 + p, 1.0))
 
 
-def inertia_by_spring(p: float, extra: Extra, c: TrueConditions) -> TrueConditions:
-    """Izz (1 + p u) with a u of every spring but the softest, uniform from −1 to 1; the stiffest has 1."""
-    springs = np.unique(c.spring_stiffness)
-    share = np.random.default_rng(int(extra["seed"])).uniform(-1.0, 1.0, springs.size)
-    share[0], share[-1] = 0.0, 1.0
-    return replace(c, inertia_scale=1.0 + p * share[np.searchsorted(springs, c.spring_stiffness)])
-
-
 def speed_offset(p: float, extra: Extra, c: TrueConditions) -> TrueConditions:
     """True speed V + ΔV (20/V)^n where the wind is on."""
     ratio = 20.0 / np.where(c.wind_on, c.wind_speed, 20.0)
@@ -153,7 +145,6 @@ LINEAR_IN_A_RECORD = frozenset(
         ROD,
         "unsteady_aero_lag",
         "spring_miscalibration",
-        "inertia_by_spring",
         "wind_speed_offset",
         "wind_speed_drift",
     }

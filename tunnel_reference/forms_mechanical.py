@@ -5,17 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tunnel_reference import moments as m
-from tunnel_reference.catalogue import (
-    Draw,
-    Extra,
-    Form,
-    Group,
-    calibration,
-    flexible_rod,
-    inertia_by_spring,
-    moving,
-    one_spring,
-)
+from tunnel_reference.catalogue import Draw, Extra, Form, Group, calibration, flexible_rod, moving, one_spring
 from tunnel_reference.integrator import Phase
 from tunnel_reference.true_conditions import Array, TrueConditions
 
@@ -140,8 +130,6 @@ _ROD = (
          draw=_rod_draw(0.2, 0.4, 1.0, 0.08), limits=(2e-7, 2e-2)),
     Form("spring_miscalibration", "one_spring", T, "x", 1e-3, calibration(one_spring), _BOTH,
          draw=lambda g, _c: {"spring": float(g.integers(0, 12))}),
-    Form("inertia_by_spring", "adapters", T, "x", 1e-3, calibration(inertia_by_spring), _BOTH,
-         draw=lambda g, _c: {"seed": float(g.integers(0, 2**31))}, edition=5),
 )  # fmt: skip
 
 FORMS: tuple[Form, ...] = (*_FRICTION, *_DAMPING, *_SPRING, *_ROD)

@@ -34,7 +34,7 @@ def in_phase(draw: CampaignDraw) -> dict[str, float] | None:
     if not laws or not np.any(c.wind_on):
         return None
     stiffness = np.maximum(c.true_stiffness - c.air_stiffness, 1e-9)
-    omega = np.sqrt(stiffness / c.true_inertia)[c.wind_on]
+    omega = np.sqrt(stiffness / c.yaw_inertia)[c.wind_on]
     (term,) = laws
     params = {name: np.broadcast_to(value, (c.runs,))[c.wind_on] for name, value in term.params.items()}
     response = _RESPONSES[term.law](omega, params)

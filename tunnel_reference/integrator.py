@@ -171,7 +171,7 @@ class _Batch:
         self.stiffness = np.concatenate([c.true_stiffness * np.ones(c.runs) for c in conditions])
         self.air_stiffness = np.concatenate([c.air_stiffness for c in conditions])
         self.air_damping = np.concatenate([c.air_damping for c in conditions])
-        self.inertia = np.concatenate([c.true_inertia for c in conditions])
+        self.inertia = np.repeat([c.yaw_inertia for c in conditions], runs)
         self.damping = np.concatenate([c.true_damping for c in conditions])
         self.release = np.concatenate([c.start_angle for c in conditions])
         self.rate = np.concatenate([np.broadcast_to(c.start_rate, (c.runs,)) for c in conditions])

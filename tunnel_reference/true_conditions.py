@@ -115,7 +115,6 @@ class TrueConditions:
         sample_rate: Hz.
         stiffness_scale: true over stated stiffness.
         speed_offset: true minus stated speed where the wind is on, m/s.
-        inertia_scale: Izz of the run over the campaign's.
         cn_beta_scale: Cnβ of the run over the campaign's.
         rod: the flexible rod; None where it is rigid.
         noise_corner: corner frequency of the coloured part of the noise, Hz.
@@ -158,7 +157,6 @@ class TrueConditions:
     sample_rate: float = 1000.0
     stiffness_scale: Array = field(default_factory=lambda: np.ones(1))
     speed_offset: Array = field(default_factory=lambda: np.zeros(1))
-    inertia_scale: Array = field(default_factory=lambda: np.ones(1))
     cn_beta_scale: Array = field(default_factory=lambda: np.ones(1))
     rod: TwistingRod | None = None
     noise_corner: float = 10.0
@@ -224,11 +222,6 @@ class TrueConditions:
         return self.spring_stiffness * self.stiffness_scale * (1.0 + self.stiffness_deviation)
 
     @property
-    def true_inertia(self) -> Array:
-        """Izz of every run, kg m², shape (runs,)."""
-        return np.broadcast_to(self.yaw_inertia * self.inertia_scale, (self.runs,))
-
-    @property
     def true_damping(self) -> Array:
         """The mechanical damping of every run, N m s/rad, shape (runs,)."""
         return np.broadcast_to(self.mechanical_damping * (1.0 + self.damping_deviation), (self.runs,))
@@ -270,4 +263,4 @@ class TrueConditions:
     @property
     def wind_off_omega(self) -> Array:
         """√(Kr/Izz), rad/s, shape (runs,)."""
-        return np.sqrt(self.true_stiffness / self.true_inertia)
+        return np.sqrt(self.true_stiffness / self.yaw_inertia)

@@ -103,6 +103,6 @@ def role_in_effect(kind: type[Effect], info: ParameterInfo) -> Role:
         wind=(1.0 if damps else 2.0) if windy else 0.0,
         input=kind.driven,
         reading=kind.channel == "sensor",
-        stated=bool(kind.chosen_springs()),
+        stated=kind.chosen_spring() is not None,
         length=info.along_run,
     )

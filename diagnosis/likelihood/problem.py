@@ -56,7 +56,6 @@ class Problem:
             for info in kind.parameters():
                 name = f"{kind.name}.{info.name}"
                 free = not info.of_input and (not info.form or name in self.free_forms)
-                free &= not info.with_spring or held.get(f"{kind.name}.{info.with_spring}", 0.0) > 0.0
                 if free and name not in held and self.data.model.tells(info, swing):
                     low, high = info.fit_range(swing)
                     found.append(Parameter(name, info.unit, low, high, info.scale, effect=kind.name))
@@ -73,14 +72,6 @@ class Problem:
     def effect_names(self) -> tuple[str, ...]:
         """Names of the free effect parameters, as ``effect.parameter``."""
         return tuple(one.name for one in self.parameters.common if one.effect)
-
-    @cached_property
-    def further_causes(self) -> int:
-        """Numbers of springs beyond the first of their effect: each could be a cause by itself."""
-        further = (
-            f"{kind.name}.{i.name}" for kind in self.effects for i in kind.parameters() if i.with_spring
-        )
-        return sum(name in self.names for name in further)
 
     @property
     def bounds(self) -> tuple[Array, Array]:

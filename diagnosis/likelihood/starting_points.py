@@ -124,8 +124,6 @@ class _TrialChange:
         scaled: index of the scaled one among them; None: there is none.
         replaced: index of the common parameter that the effect replaces; None: there is none.
         change: of the scaled prediction, by run, shape (n,).
-        beside: indices of the parameters that are set together with the scaled one, with their changes at their
-            own sizes.
     """
 
     problem: Problem
@@ -134,7 +132,6 @@ class _TrialChange:
     scaled: int | None
     replaced: int | None
     change: list[Array]
-    beside: tuple[tuple[int, float, list[Array]], ...] = ()
 
 
 def _moderate(base: Fit, kind: type[Effect], trial: Trial) -> _TrialChange | None:
@@ -148,17 +145,7 @@ def _moderate(base: Fit, kind: type[Effect], trial: Trial) -> _TrialChange | Non
     names = base.problem.names
     replaced = names.index(trial.replaces) if trial.replaces in names else None
     change = _moderate_change(base, problem, sizes, scaled, replaced, second_order=trial.second_order)
-    if change is None:
-        return None
-    beside = []
-    for name in trial.beside:
-        place = [info.name for info in own].index(name)
-        others = np.where(np.arange(sizes.size) == place, own[place].scale, 0.0)
-        further = _moderate_change(base, problem, others, place)
-        if further is None:
-            return None
-        beside.append((place, float(others[place]), further))
-    return _TrialChange(problem, own, sizes, scaled, replaced, change, tuple(beside))
+    return None if change is None else _TrialChange(problem, own, sizes, scaled, replaced, change)
 
 
 def _within(infos: Sequence[ParameterInfo], values: Array) -> bool:
@@ -194,7 +181,7 @@ def _by_linear_theory(base: Fit, kind: type[Effect], trial: Trial) -> StartingPo
         for _ in range(_ABSORBED):
             moved = absorbed(base, change, moved)
             change = change_to(base, problem, Point(np.concatenate([moved.common, sizes]), moved.per_run))
-    added = _added(base, change, [one for *_, one in tried.beside])
+    added = _added(base, change)
     if added is None or (moved is not None and added.slope <= 0.0):
         return None
     start, drop, slope = sizes.copy(), added.drop, added.slope
@@ -204,8 +191,6 @@ def _by_linear_theory(base: Fit, kind: type[Effect], trial: Trial) -> StartingPo
         start[scaled] = np.clip(moderate, own[scaled].lower, own[scaled].upper)
         if start[scaled] == 0.0:
             start[scaled], drop = 0.01 * sizes[scaled], 0.0
-        for (of, size, _), part in zip(tried.beside, added.beside, strict=True):
-            start[of] = np.clip(part * size, own[of].lower, own[of].upper)
         if replaced is not None:
             start[scaled] = min(start[scaled], base.point.common[replaced])
     point = Point(_with_effect(base, start, scaled, replaced), base.point.per_run)
@@ -230,7 +215,6 @@ class _Added:
         residuals: scaled, by run.
         scatter: chance differences between the runs, with their likeliest widths beside the change.
         scatter_cost: −2 ln of their evidence, dimensionless.
-        beside: the best sizes of further changes, as multiples of them.
     """
 
     slope: float
@@ -238,19 +222,12 @@ class _Added:
     residuals: list[Array]
     scatter: Scatter = ()
     scatter_cost: float = 0.0
-    beside: tuple[float, ...] = ()
 
 
-def _added(base: Fit, change: list[Array], beside: Sequence[list[Array]] = ()) -> _Added | None:
-    """A change added to a fit; None where the fit absorbs it, or the change is not finite.
-
-    Args:
-        beside: further changes that are added with it.
-    """
+def _added(base: Fit, change: list[Array]) -> _Added | None:
+    """A change added to a fit; None where the fit absorbs it, or the change is not finite."""
     if base.between is not None:
-        return _added_beside_scatter(base, base.between, (change, *beside))
-    if beside:
-        return _added_together(base, (change, *beside))
+        return _added_beside_scatter(base, base.between, change)
     left = project_out(base, change)
     power = sum(float(c @ c) for c in left)
     if not 0.0 < power < np.inf:
@@ -260,42 +237,25 @@ def _added(base: Fit, change: list[Array], beside: Sequence[list[Array]] = ()) -
     return _Added(slope, slope * slope * power, after)
 
 
-def _added_together(base: Fit, changes: Sequence[list[Array]]) -> _Added | None:
-    """Several changes added to a fit, each at its best size; None where the fit absorbs them."""
-    columns = [np.concatenate(project_out(base, change)) for change in changes]
-    matrix, residual = np.stack(columns, axis=1), np.concatenate(base.residuals)
-    if not np.all(np.isfinite(matrix)) or not np.any(matrix):
+def _added_beside_scatter(base: Fit, between: Between, change: list[Array]) -> _Added | None:
+    """A change added to a fit whose runs differ by chance: with a further cause, they may differ less."""
+    if not all(np.all(np.isfinite(one)) for one in change):
         return None
-    sizes = np.linalg.lstsq(matrix, residual, rcond=1e-9)[0]
-    after = residual - matrix @ sizes
-    ends = np.cumsum([run.size for run in base.residuals])[:-1]
-    drop = float(residual @ residual - after @ after)
-    return _Added(float(sizes[0]), drop, np.split(after, ends), beside=tuple(sizes[1:].tolist()))
-
-
-def _added_beside_scatter(base: Fit, between: Between, changes: Sequence[list[Array]]) -> _Added | None:
-    """Changes added to a fit whose runs differ by chance: with a further cause, they may differ less."""
-    if not all(np.all(np.isfinite(one)) for change in changes for one in change):
-        return None
-    columns, sizes = base.columns, []
-    for change in changes:
-        columns, size = columns.with_column(change)
-        sizes.append(size)
+    columns, size = base.columns.with_column(change)
     beside = columns.likeliest(width_prior(base.problem), between.widths)
-    slopes = beside.likeliest.common[-len(sizes) :] / np.array(sizes)
     return _Added(
-        float(slopes[0]),
+        float(beside.likeliest.common[-1]) / size,
         between.likelihood - beside.likelihood,
         columns.remaining_residuals(beside.likeliest),
         tuple(one.as_wide_as(width) for one, width in zip(base.problem.scatter, beside.widths, strict=True)),
         beside.cost(base.columns.products.own),
-        tuple(slopes[1:].tolist()),
     )
 
 
 def _tried(base: Fit, kind: type[Effect], trial: Trial) -> Problem:
     """A problem with one more effect, with the parameters that a trial fixes and frees."""
-    held = {spring: trial.values.get(spring, 0.0) for spring in kind.chosen_springs()}
+    spring = kind.chosen_spring()
+    held = {} if spring is None else {spring: trial.values[spring]}
     fixed = (*base.problem.fixed, *((f"{kind.name}.{name}", value) for name, value in held.items()))
     freed = next((form for form in kind.forms() if any(name in trial.values for name in form)), ())
     free_forms = (*base.problem.free_forms, *(f"{kind.name}.{name}" for name in freed))

@@ -416,11 +416,6 @@ class NominalModel:
                 "a wind-speed offset as opposed to a dependence of Cnβ on the speed, but by the damping: there are "
                 "two wind speeds only"
             )
-        if len(data.springs) > 1 and not _at_two_speeds(data):
-            found.append(
-                "an inertia that differs from spring to spring as opposed to wrong stiffnesses: no two springs "
-                "have runs at two wind speeds"
-            )
         if self.windy and not data.in_still_air:
             found.append("whether an effect is mechanical or aerodynamic: there is no run with the wind off")
         common = [one for one in self.parameters(data) if one.owner == "common" and one.name != "zero"]
@@ -452,13 +447,6 @@ class NominalModel:
     def planned_springs(self, data: PreparedRuns) -> tuple[float, ...]:
         """Stiffnesses of the springs with which a further run can be made, ascending, N m/rad."""
         return data.springs
-
-
-def _at_two_speeds(data: PreparedRuns) -> bool:
-    """Whether two springs or more have runs at two wind speeds, zero included."""
-    known = {(run.spring_stiffness, run.wind_speed) for run in data.runs}
-    several = [spring for spring in data.springs if sum(one == spring for one, _ in known) > 1]
-    return len(several) > 1
 
 
 @lru_cache(maxsize=8)

@@ -81,7 +81,7 @@ class _OfServo(NominalModel):
     def untried(self, campaign: Campaign, kinds: Sequence[type[Effect]]) -> dict[str, list[type[Effect]]]:
         """Effects of a spring, and play."""
         play: list[type[Effect]] = [kind for kind in kinds if issubclass(kind, Backlash)]
-        of_spring = [k for k in kinds if (k.on_spring or k.chosen_springs()) and k not in play]
+        of_spring = [k for k in kinds if (k.on_spring or k.chosen_spring() is not None) and k not in play]
         left = [kind for kind in kinds if kind not in (*play, *of_spring)]
         return {OF_GEAR: play, _NO_SPRING: of_spring} | super().untried(campaign, left)
 

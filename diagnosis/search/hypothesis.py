@@ -179,8 +179,7 @@ class Hypothesis:
         share = (self.fit.excess + by_chance) / nominal.gap
         cost = self.fit.scatter_cost(gap.deviation_precision)
         between = self.fit.shown_between_runs
-        numbers, causes = self.further_numbers, self.fit.problem.further_causes
-        return FittedSet(self.effects, share, self.excess, numbers, outside, cost, between, causes)
+        return FittedSet(self.effects, share, self.excess, self.further_numbers, outside, cost, between)
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,7 +215,7 @@ class Scale:
         """Logarithm of the weight of a set whose misfit is known."""
         costs, left = (given.scatter_cost, self.scatter_cost), given.excess - self.least
         return log_weight(
-            left, self.misfit, given.causes, given.numbers, self.chosen, costs, given.shown_between_runs
+            left, self.misfit, len(given.effects), given.numbers, self.chosen, costs, given.shown_between_runs
         )
 
     def greatest(self, hypothesis: Hypothesis, *, repeating: bool = True) -> float:
@@ -237,8 +236,7 @@ class Scale:
         self, left: Array, of: Hypothesis, *, effects: int = 0, numbers: int = 0, scatter_cost: float = 0.0
     ) -> float:
         """Logarithm of the weight of a set with a misfit ``left`` and further effects and parameters."""
-        count = len(of.effects) + of.fit.problem.further_causes + effects
-        further = of.further_numbers + numbers
+        count, further = len(of.effects) + effects, of.further_numbers + numbers
         costs = scatter_cost, self.scatter_cost
         return log_weight(left, self.misfit, count, further, self.chosen, costs, of.fit.shown_between_runs)
 

@@ -83,18 +83,12 @@ def sets_with_one_more(
                 near = [point for start in starts if (point := start.nearer()) is not None]
                 tried += [fitted for start in near if (fitted := _fitted(start, base)) is not None]
             there = filter(is_plausible, map(turned_back, tried))
-            best = min(there, key=_unlikelihood, default=None)
+            best = min(there, key=lambda fitted: fitted.unlikelihood, default=None)
             if best is not None:
-                if parent.repeating is not None:
-                    best = likelier(best, _repeating(parent, kind, best.problem.further_causes))
+                best = likelier(best, _repeating(parent, kind)) if parent.repeating is not None else best
                 child = Hypothesis((*parent.effects, kind.name), best)
                 sets[child.names] = of_more_weight(sets.get(child.names), child, gap_left(base))
     return list(sets.values())
-
-
-def _unlikelihood(fitted: Fit) -> float:
-    """−2 ln of the likelihood, with the least drop for every number that could be a cause by itself."""
-    return fitted.unlikelihood + LEAST_DROP * fitted.problem.further_causes
 
 
 def _worth_fitting(
@@ -129,17 +123,12 @@ def _worth_fitting(
     return [item for i, item in enumerate(scored) if i < ALWAYS_FITTED or item[1][0].predicted_drop > limit]
 
 
-def _repeating(parent: Hypothesis, kind: type[Effect], further_causes: int) -> Fit | None:
-    """The set with one more effect, fitted to runs that repeat exactly; the best from its starting points.
-
-    Args:
-        further_causes: of the set that it is compared with.
-    """
+def _repeating(parent: Hypothesis, kind: type[Effect]) -> Fit | None:
+    """The set with one more effect, fitted to runs that repeat exactly; the best from its starting points."""
     base = parent.repeating
     if base is None:
         return None
-    found = starting_points(base, kind)
-    starts = [start for start in found if start.problem.further_causes == further_causes][: kind.tries]
+    starts = starting_points(base, kind)[: kind.tries]
     tried = [fitted for start in starts if (fitted := _fitted(start, base)) is not None]
     there = filter(is_plausible, map(turned_back, tried))
     return min(there, key=lambda fitted: fitted.total, default=None)

@@ -51,7 +51,6 @@ class FittedSet:
         outside: whether it is from outside the vocabulary: its probability is added to ``unknown``.
         scatter_cost: −2 ln of the evidence of its chance differences between runs, dimensionless.
         shown_between_runs: number of its effects that only the comparison of runs shows.
-        further_causes: numbers of springs beyond the first of their effect, each of which costs as an effect.
     """
 
     effects: tuple[str, ...]
@@ -61,12 +60,6 @@ class FittedSet:
     outside: bool = False
     scatter_cost: float = 0.0
     shown_between_runs: int = 0
-    further_causes: int = 0
-
-    @property
-    def causes(self) -> int:
-        """Number of effects, with the further causes."""
-        return len(self.effects) + self.further_causes
 
 
 def weigh(
@@ -99,7 +92,7 @@ def weigh(
             log_weight(
                 s.excess - least,
                 scale,
-                s.causes,
+                len(key),
                 s.numbers,
                 chosen,
                 (s.scatter_cost, nominal.scatter_cost),

@@ -98,8 +98,6 @@ VARIANTS: list[tuple[str, dict[str, float], Setting]] = [
     ("sensor_hysteresis", {"half_width": 0.01}, replace(RUN, release=-0.1)),
     ("sensor_drift", {"drift": -0.01}, RUN),
     ("spring_miscalibration", {"error": -0.1, "spring_stiffness": 16.12}, RUN),
-    ("inertia_by_spring", {"first": -0.1, "first_spring": 16.12}, RUN),
-    ("inertia_by_spring", {"first": 0.1, "first_spring": 44.84}, replace(RUN, spring=44.84)),
     ("wind_speed_offset", {"offset": -1.5}, RUN),
     ("reynolds_dependence", {"per_e_fold": -0.3}, replace(RUN, speed=8.0)),
     ("stiffness_scatter", {"spread": 0.05}, replace(RUN, speed=0.0)),

@@ -149,13 +149,6 @@ def _other_spring(p: Parameters, run: Setting) -> Moment:
     return nominal(run.spring * (1.0 + p["error"]) if hit else run.spring, run.speed)
 
 
-def _other_inertia(p: Parameters, run: Setting) -> Moment:
-    base, hit = nominal(run.spring, run.speed), abs(p["first_spring"] - run.spring) < 1e-6
-    return lambda t, b, r: (
-        base(t, b, r) / (1.0 + p["first"] * hit)
-    )  # as the inertia of the oracle is the stated one
-
-
 def _drifting(p: Parameters, run: Setting) -> Moment:
     def speed(t: float) -> float:
         if p.get("time_constant", 0.0) > 0.0:
@@ -187,7 +180,6 @@ OTHER_CONDITIONS: dict[str, Callable[[Parameters, Setting], Moment]] = {
     "wind_speed_drift": _drifting,
     "wind_speed_offset": lambda p, run: nominal(run.spring, run.speed + p["offset"]),
     "spring_miscalibration": _other_spring,
-    "inertia_by_spring": _other_inertia,
 }
 # The nominal moments where a number of the run is so many times as great as stated.
 BETWEEN_RUNS: dict[str, Callable[[float, Setting], Moment]] = {

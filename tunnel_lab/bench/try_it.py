@@ -177,8 +177,8 @@ def chosen_effect(trial: RigTrial) -> Effect | None:
     kind = effect_class(trial.effect)
     infos = kind.parameters()
     values = {info.name: value for info, value in zip(infos, kind.example, strict=False)}
-    values |= {infos[0].name: trial.severity}
-    values |= dict.fromkeys(kind.chosen_springs()[:1], trial.spring_stiffness)
+    spring = kind.chosen_spring()
+    values |= {infos[0].name: trial.severity} | ({} if spring is None else {spring: trial.spring_stiffness})
     return kind(**values)
 
 

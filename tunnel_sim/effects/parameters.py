@@ -41,8 +41,6 @@ class ParameterInfo:
         chosen_spring: whether it is the stiffness of one of the campaign's springs: chosen, not fitted.
         per_pressure: whether it multiplies ½ρV²Al, so that its unit depends on which sizes are stated.
         inside: whether a fit at one of its bounds calls for another law, as with a free exponent.
-        with_spring: name of the parameter that is the spring it belongs to, where the effect has several: it is
-            free where that spring is chosen, and counts as a further cause; empty: none.
         of_input: whether it relates the effect to the input of a driven run; values are tried and not fitted. Free
             decays do not depend on it.
         along_run: whether it shapes a change along the run.
@@ -68,7 +66,6 @@ class ParameterInfo:
     rate_exponent: str = ""
     beside_spring: bool = False
     chosen_spring: bool = False
-    with_spring: str = ""
     per_pressure: bool = False
     inside: bool = False
     of_input: bool = False
@@ -196,7 +193,6 @@ class Trial:
 
     Args:
         at_most: greatest absolute value that linear theory may give it, in its unit.
-        beside: further parameters that linear theory sets together with the scaled one; they start at 0.
         second_order: whether the nominal coefficients absorb its first order, so that its square shows.
         passive: whether a passive part can have this sign; an upper limit is stated for such a sign alone.
     """
@@ -205,7 +201,6 @@ class Trial:
     scaled: str | None
     at_most: float = inf
     replaces: str | None = None
-    beside: tuple[str, ...] = ()
     second_order: bool = False
     passive: bool = True
 

@@ -150,14 +150,8 @@ class Traits:
 
     @classmethod
     def chosen_spring(cls) -> str | None:
-        """Name of the parameter that is a spring's stiffness; None if there is none, or several."""
-        names = cls.chosen_springs()
-        return names[0] if len(names) == 1 else None
-
-    @classmethod
-    def chosen_springs(cls) -> tuple[str, ...]:
-        """Names of the parameters that are stiffnesses of springs."""
-        return tuple(info.name for info in cls.parameters() if info.chosen_spring)
+        """Name of the parameter that is a spring's stiffness; None if there is none."""
+        return next((info.name for info in cls.parameters() if info.chosen_spring), None)
 
     @classmethod
     def phrase(cls, values: Mapping[str, float], stds: Mapping[str, float | None], text: Text) -> str:

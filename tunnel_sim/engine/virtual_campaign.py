@@ -205,9 +205,9 @@ def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
             raise TunnelError("is given twice", where=where, remedy=remedy)
         if effect.is_null:
             continue
-        for chosen in filter(None, (getattr(effect, name) for name in effect.chosen_springs())):
-            if any(isclose(k, chosen, rel_tol=SPRING_TOLERANCE) for k in springs):
-                continue
+        parameter = effect.chosen_spring()
+        chosen = None if parameter is None else getattr(effect, parameter)
+        if chosen is not None and not any(isclose(k, chosen, rel_tol=SPRING_TOLERANCE) for k in springs):
             what = f"no run has a spring_stiffness of {chosen:g} N m/rad"  # so it would have no effect
             remedy = f"give one of {', '.join(f'{spring:g}' for spring in springs)}"
             raise TunnelError(what, where=where, remedy=remedy)

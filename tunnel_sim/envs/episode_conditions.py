@@ -305,7 +305,8 @@ def _effects(
         kind = kinds[int(rng.integers(len(kinds)))]
         severity = kind.parameters()[0]
         value = min(severity.upper, severity.scale * float(rng.uniform(*SEVERITY_SHARE)))
-        chosen = dict.fromkeys(kind.chosen_springs()[:1], condition.spring_stiffness)
+        spring = kind.chosen_spring()
+        chosen = {} if spring is None else {spring: condition.spring_stiffness}
         return [EffectSetting(kind.name, {severity.name: value, **chosen})]
     if isinstance(stated, Mapping):
         for name, values in stated.items():

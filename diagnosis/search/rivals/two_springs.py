@@ -104,4 +104,4 @@ def spring_error(fit: Fit, name: str, similarity: Similarity) -> SpringError:
 def _differs_by_spring(kind: type[Effect]) -> bool:
     """Whether an effect changes the frequency of the runs by a share that depends on the spring."""
     stiffens = kind.channel == "stiffness" and kind.condition == "always" and not kind.on_spring
-    return stiffens or bool(kind.chosen_springs())
+    return stiffens or kind.chosen_spring() is not None

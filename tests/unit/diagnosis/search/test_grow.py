@@ -128,12 +128,7 @@ def left(*effects, damping):
         excess=np.array([damping, 0.0, 0.0, 0.0, 0.0, 0.0]),
         further_numbers=0,
         explains_runs=False,
-        fit=SimpleNamespace(
-            settings=Settings(),
-            scatter_cost=lambda _: 0.0,
-            shown_between_runs=0,
-            problem=SimpleNamespace(further_causes=0),
-        ),
+        fit=SimpleNamespace(settings=Settings(), scatter_cost=lambda _: 0.0, shown_between_runs=0),
     )
 
 
