@@ -10,7 +10,7 @@ import numpy as np
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.mains_lines import mains_line
 from diagnosis.likelihood.residuals import SpectralLine, linear_coefficients, resonance, wind_line
-from tunnel_sim.effects.base import HARMONICS, NEAR_MOTION, REFERENCE_RELEASE, beats_with
+from tunnel_sim.effects.base import MULTIPLES, NEAR_MOTION, REFERENCE_RELEASE
 from tunnel_sim.effects.evidence import Sought
 from tunnel_sim.vocabulary.record import Array
 
@@ -67,8 +67,8 @@ def ringing(fit: Fit) -> Sought | None:
         Amplitude (rad), angular frequency (rad/s) and damping ratio with every run's phase; None where no
         frequency is distinct from the motion.
 
-    A run does not count where the frequency does not beat with its own motion, or is a multiple of it. At least
-    half of the runs must count: springs and winds differ, so a line at the motion of one run is apart in another.
+    A run does not count where the frequency is its own motion's, or a multiple of it. At least half of the
+    runs must count: springs and winds differ, so a line near the motion of one run is distinct in another.
     """
     runs = fit.problem.data.runs
     step = 1.0 / (_RINGING_PADDING * max(run.duration for run in runs))
@@ -76,11 +76,9 @@ def ringing(fit: Fit) -> Sought | None:
     apart = []  # by run, where the grid is neither the run's own frequency nor a multiple of it
     for run in runs:
         padded = _RINGING_PADDING * run.reading.size
-        # the start counts most: a second mode may outlast the motion
-        swing = (run.reading - run.reading.mean()) * np.hanning(2 * run.reading.size)[run.reading.size :]
+        swing = (run.reading - run.reading.mean()) * np.hanning(run.reading.size)
         own = float(np.argmax(np.abs(np.fft.rfft(swing, padded)))) / (padded * run.interval)
-        harmonic = np.any([np.abs(grid - k * own) <= NEAR_MOTION * own for k in HARMONICS], axis=0)
-        apart.append(beats_with(grid, own, run.duration) & ~harmonic)
+        apart.append(np.all([np.abs(grid - k * own) > NEAR_MOTION * own for k in MULTIPLES], axis=0))
     beside = np.array(apart)
     free = np.mean(beside, axis=0) >= MODE_RUNS
     if not free.any():
