@@ -108,8 +108,12 @@ class WholeRuns(View):
 
     @cached_property
     def shaken(self) -> tuple[Hypothesis, ...]:
-        """The sets with a random moment beside a known one; none without known sets."""
-        return tuple(weigh_random_moments(self, self.known)) if self.known else ()
+        """The sets with a random moment beside effects; none without known sets.
+
+        These come from stretches: the nominal model loses the phase, which a moment alone does not explain.
+        """
+        tried = weigh_random_moments(self, self.known) if self.known else []
+        return tuple(one for one in tried if one.effects)
 
     @property
     def repeating(self) -> Fit:
