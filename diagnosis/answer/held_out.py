@@ -17,8 +17,9 @@ from diagnosis.likelihood.residuals import resonance
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.data import FOLDS, folds
 from diagnosis.model.parameters import Point
-from diagnosis.search.hypothesis import MomentLayer, restricted
+from diagnosis.search.hypothesis import restricted
 from diagnosis.search.prepared import COARSE_STEP, HUM
+from diagnosis.search.process_noise import MomentLayer
 from diagnosis.search.scatter import with_scatter, without_deviations
 from diagnosis.search.study import Study
 from tunnel_sim.effects import Effect

@@ -16,10 +16,9 @@ from diagnosis.likelihood.other_minima import deepest
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, linear_coefficients, misfit, resonance
 from diagnosis.model.parameters import Point
-from diagnosis.search.process_noise import ProcessNoise
+from diagnosis.search.process_noise import MomentLayer
 from diagnosis.search.weigh import FittedSet, least_excess, log_weight, misfit_scale
 from diagnosis.settings import WeighingSettings
-from tunnel_sim.effects import Effect
 from tunnel_sim.effects.capabilities import OwnNumbers
 from tunnel_sim.vocabulary.record import Array
 
@@ -47,22 +46,6 @@ Form: TypeAlias = tuple[str, ...]
 
 _POLISH = 1e-7  # drop of χ², as a share of it, at which a polished fit has converged
 _SAME_READING = 0.2  # noise standard deviations of a block mean
-
-
-@dataclass(frozen=True, eq=False)
-class MomentLayer:
-    """A random moment: a layer of noise under the effects of a set, and itself a cause.
-
-    Args:
-        kinds: the effects that its spectrum's parts are.
-        process: the moment as fitted.
-        left: the set with it, as input of the weighing. Its share is the excess of the innovations and of the other
-            runs over the nominal excess, the same in every channel.
-    """
-
-    kinds: tuple[type[Effect], ...]
-    process: ProcessNoise
-    left: FittedSet
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,8 +32,10 @@ from diagnosis.search.random_spectra import (
     of_surroundings,
     wandering,
 )
+from diagnosis.search.weigh import FittedSet
 from diagnosis.settings import RandomMomentSettings
 from identification.signal.filter import discretised, steady_filters
+from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.record import Array
 
 PART_STDS: Final = 2.0
@@ -85,6 +87,22 @@ class ProcessNoise:
         """Price of −2 ln L beyond one part without a centre, ``of_part`` for each further one; dimensionless."""
         centres = sum(part.centre > 0.0 for part in self.spectrum)
         return of_part * (centres + len(self.spectrum) - 1)
+
+
+@dataclass(frozen=True, eq=False)
+class MomentLayer:
+    """A random moment: a layer of noise under the effects of a set, and itself a cause.
+
+    Args:
+        kinds: the effects that its spectrum's parts are.
+        process: the moment as fitted.
+        left: the set with it, as input of the weighing. Its share is the excess of the innovations and of the other
+            runs over the nominal excess, the same in every channel.
+    """
+
+    kinds: tuple[type[Effect], ...]
+    process: ProcessNoise
+    left: FittedSet
 
 
 @dataclass(frozen=True, eq=False)

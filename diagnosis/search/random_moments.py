@@ -24,9 +24,10 @@ from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
 from diagnosis.search.evident import evident, needed
 from diagnosis.search.grow import grow
-from diagnosis.search.hypothesis import Hypothesis, MomentLayer, Scale, of_more_weight, restricted
+from diagnosis.search.hypothesis import Hypothesis, Scale, of_more_weight, restricted
 from diagnosis.search.one_more import sets_with_one_more
 from diagnosis.search.process_noise import (
+    MomentLayer,
     ProcessNoise,
     acts_by,
     is_of_reading,

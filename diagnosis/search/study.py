@@ -15,8 +15,9 @@ from diagnosis.noise.gap import GapTest
 from diagnosis.search.choices import Choice, choices
 from diagnosis.search.clock import StepClock
 from diagnosis.search.disturbance import Disturbance
-from diagnosis.search.hypothesis import Hypothesis, MomentLayer
+from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.prepared import Prepared
+from diagnosis.search.process_noise import MomentLayer
 from diagnosis.search.rivals.rival import FoundRival
 from diagnosis.search.scatter import evident, named, shown_by
 from diagnosis.search.sets import Names, Sets

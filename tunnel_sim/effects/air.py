@@ -302,10 +302,8 @@ class WindSpeedDrift(Effect):
     condition = "wind_on"
     advice = "Keep the wind speed constant during the run, or record it"
     equation = (
-        "V(t) = V (1 + d t/T) over a run of length T; general forms: "
-        + EQUATION
-        + " for t/T, and a wind that "
-        "settles, V (1 − d e^(−t/τ)), whose stated speed V is the final one; k is then not used"
+        f"V(t) = V (1 + d t/T) over a run of length T; general forms: {EQUATION} for t/T, and a wind that settles, "
+        "V (1 − d e^(−t/τ)), whose stated speed V is the final one; k is then not used; V(t) ≥ 0"
     )
     signature = "The frequency of wind-on runs changes with time rather than with amplitude."
     references = ("Barlow, Rae & Pope, Low-Speed Wind Tunnel Testing, Wiley 1999",)

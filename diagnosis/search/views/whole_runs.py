@@ -147,11 +147,11 @@ class WholeRuns(View):
         From there on they are grown beside chance differences. Where none does, and no set explains runs that
         repeat, the likeliest are compared beside such differences.
         """
+        grown, explained = self.known, self.explained
+        if not explained and self.shaken:
+            return _with_random(self.shaken, Sets(self, grown))
         if self.unscattered is not None or self.first is not None:
             return _with_moments(super().sets(clock), clock)
-        grown, explained = self.known, self.explained
-        if self.shaken and not explained:
-            return _with(self.shaken, Sets(self, grown))
         floor: float | None = None
         with clock.step("effects"):
             for step in () if explained else levels(self, clock.progress):
@@ -327,10 +327,10 @@ class WholeRuns(View):
 def _with_moments(found: Sets, clock: StepClock) -> Sets:
     """Sets, and the random moments that may act beside them."""
     with clock.step("random moments"):
-        return _with(weigh_random_moments(found.view, found.hypotheses), found)
+        return _with_random(weigh_random_moments(found.view, found.hypotheses), found)
 
 
-def _with(random: Sequence[Hypothesis], found: Sets) -> Sets:
+def _with_random(random: Sequence[Hypothesis], found: Sets) -> Sets:
     """Sets with random moments, and without them: a moment may not be real."""
     sets = without_the_random_moment(random, found.hypotheses, found.view.gap)
     return replace(found, random=tuple(random), hypotheses=tuple(sets))

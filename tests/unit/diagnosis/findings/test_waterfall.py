@@ -20,8 +20,8 @@ from diagnosis.findings.candidates import Candidate, inclusion
 from diagnosis.likelihood.partial import fit_seen
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.data import FOLDS
-from diagnosis.search.hypothesis import Hypothesis, MomentLayer
-from diagnosis.search.process_noise import ProcessNoise
+from diagnosis.search.hypothesis import Hypothesis
+from diagnosis.search.process_noise import MomentLayer, ProcessNoise
 from diagnosis.search.random_spectra import SpectrumPart
 from diagnosis.search.study import Answer
 from diagnosis.search.weigh import FittedSet

@@ -11,9 +11,9 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
 from diagnosis.findings.averaged_coefficients import coefficients, possible_answers
-from diagnosis.search.hypothesis import Hypothesis, MomentLayer
+from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import investigate
-from diagnosis.search.process_noise import is_of_reading, likeliest, random_moments
+from diagnosis.search.process_noise import MomentLayer, is_of_reading, likeliest, random_moments
 from diagnosis.search.random_moments import obeys_a_law, weigh_random_moments
 from diagnosis.search.random_spectra import STREAM, SURROUNDINGS
 from diagnosis.search.scatter import differing

@@ -15,8 +15,8 @@ from diagnosis.search import process_noise as pn
 from diagnosis.search import random_moments
 from diagnosis.search.evident import needed
 from diagnosis.search.grow import grow
-from diagnosis.search.hypothesis import Hypothesis, MomentLayer
-from diagnosis.search.process_noise import with_response
+from diagnosis.search.hypothesis import Hypothesis
+from diagnosis.search.process_noise import MomentLayer, with_response
 from diagnosis.search.random_moments import excess_elsewhere, is_no_noise, obeys_a_law, weigh_random_moments
 from diagnosis.search.random_spectra import BROAD, CENTRED, STREAM, SpectrumPart, wandering
 from diagnosis.search.steady_noise import bursts, departure_from_white, is_steady_noise, of_all_runs

@@ -13,8 +13,9 @@ from diagnosis.answer.held_out import excess_base
 from diagnosis.noise.gap import GapTest
 from diagnosis.noise.mains import Hum
 from diagnosis.search.clock import StepClock
-from diagnosis.search.hypothesis import Hypothesis, MomentLayer
+from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.prepared import HUM_LEFT
+from diagnosis.search.process_noise import MomentLayer
 from diagnosis.search.sets import Sets, resolved
 from diagnosis.search.study import Study, noise_explains
 from diagnosis.search.views import by_moment as moments

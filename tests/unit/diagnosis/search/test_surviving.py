@@ -13,8 +13,8 @@ import pytest
 from diagnosis.likelihood.least_squares import Fit, fit
 from diagnosis.likelihood.without_run import WithoutRuns, refitted_without
 from diagnosis.model.parameters import Point
-from diagnosis.search.hypothesis import Hypothesis, MomentLayer
-from diagnosis.search.process_noise import ProcessNoise
+from diagnosis.search.hypothesis import Hypothesis
+from diagnosis.search.process_noise import MomentLayer, ProcessNoise
 from diagnosis.search.sets import Sets, resolved
 from diagnosis.search.surviving import contradicted, explains_too_much, refusal, shown_by_one
 from diagnosis.search.weigh import FittedSet
