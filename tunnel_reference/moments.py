@@ -275,11 +275,6 @@ def speed_settling(s: RungeKuttaStage, rows: Rows, p: Params, _x: Array, _dx: Ar
     s.speed_ratio[rows] *= 1.0 + p["drift"] * rise
 
 
-def speed_to_final(s: RungeKuttaStage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
-    """V(t)/V = 1 − d e^(−t/τ): V is the final speed."""
-    s.speed_ratio[rows] *= 1.0 - p["drift"] * np.exp(-s.time / p["time"])
-
-
 def gust(s: RungeKuttaStage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
     """V(t)/V = 1 + g exp(−((t − t0)/w)²): one slow gust, in the runs where g is not zero."""
     s.speed_ratio[rows] *= 1.0 + p["size"] * np.exp(-(((s.time - p["when"]) / p["width"]) ** 2))

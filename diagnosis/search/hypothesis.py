@@ -420,24 +420,15 @@ def polish(chosen: Hypothesis) -> Hypothesis:
     if better is None or better.total > first.total:
         better = first
     better = deepest(better, tolerance=_POLISH)
-    textbook, departs = None, bool(better.problem.free_forms) and not _own_law(better.problem)
-    if departs and not first.problem.free_forms:
+    textbook = None
+    if better.problem.free_forms and not first.problem.free_forms:
         textbook = first
-    elif departs:
+    elif better.problem.free_forms:
         problem = dataclasses.replace(better.problem, free_forms=())
         values = dict(zip(better.problem.names, better.point.common.tolist(), strict=True))
         start = Point(np.array([values[name] for name in problem.names]), better.point.per_run)
         textbook = try_fit(problem, start)
     return Hypothesis(chosen.effects, better, textbook)
-
-
-def _own_law(problem: Problem) -> bool:
-    """Whether a freed form is a law of its own, with which the textbook's coefficients cannot be compared."""
-    return any(
-        info.own_law and f"{kind.name}.{info.name}" in problem.free_forms
-        for kind in problem.effects
-        for info in kind.parameters()
-    )
 
 
 def _first_forms(fitted: Fit) -> tuple[Form, ...]:

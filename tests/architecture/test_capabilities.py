@@ -10,6 +10,7 @@ from tunnel_sim.effects.traits import Traits
 #: Overridden by one effect, and asked of all: a default that is right for all others. A further one is a type.
 OF_ONE = {
     "alike",  # other minima of χ²: a rod's own oscillation
+    "forms",  # by default one form of all form parameters
     "is_null",  # by default a severity of zero
     "small_swings",
     "stiffness_at_rest",

@@ -87,8 +87,6 @@ VARIANTS: list[tuple[str, dict[str, float], Setting]] = [
     ("rod_flexibility", {"compliance": 1e-5, "inertia_share": 0.1}, replace(RUN, spring=44.84)),
     ("nonlinear_yaw_moment", {"coefficient": -3.0}, RUN),
     ("wind_speed_drift", {"drift": -0.2}, RUN),
-    ("wind_speed_drift", {"drift": 0.1, "time_constant": 0.8}, RUN),
-    ("wind_speed_drift", {"drift": -0.05, "time_constant": 5.0}, RUN),
     ("nonlinear_yaw_damping", {"coefficient": -20.0}, RUN),
     ("unsteady_aero_lag", {"lag": 0.01}, RUN),  # a third of a step
     ("unsteady_aero_lag", {"lag": 15.0}, RUN),

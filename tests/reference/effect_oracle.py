@@ -149,15 +149,6 @@ def _other_spring(p: Parameters, run: Setting) -> Moment:
     return nominal(run.spring * (1.0 + p["error"]) if hit else run.spring, run.speed)
 
 
-def _drifting(p: Parameters, run: Setting) -> Moment:
-    def speed(t: float) -> float:
-        if p.get("time_constant", 0.0) > 0.0:
-            return run.speed * (1.0 - p["drift"] * exp(-t / p["time_constant"]))
-        return run.speed * (1.0 + p["drift"] * t / run.duration)
-
-    return lambda t, b, r: nominal(run.spring, speed(t))(t, b, r)
-
-
 # What an effect adds to the nominal moments.
 ADDED: dict[str, Callable[[Parameters, Setting, float], Moment]] = {
     "quadratic_damping": lambda p, _run, _: lambda _t, _b, r: -p["coefficient"] * abs(r) * r,
@@ -177,7 +168,9 @@ ADDED: dict[str, Callable[[Parameters, Setting, float], Moment]] = {
 }
 # The nominal moments at another spring or wind than stated.
 OTHER_CONDITIONS: dict[str, Callable[[Parameters, Setting], Moment]] = {
-    "wind_speed_drift": _drifting,
+    "wind_speed_drift": lambda p, run: (
+        lambda t, b, r: nominal(run.spring, run.speed * (1.0 + p["drift"] * t / run.duration))(t, b, r)
+    ),
     "wind_speed_offset": lambda p, run: nominal(run.spring, run.speed + p["offset"]),
     "spring_miscalibration": _other_spring,
 }

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from math import sqrt
 from typing import Self
 
@@ -26,7 +25,7 @@ from tunnel_sim.effects.parameters import (
     settling,
 )
 from tunnel_sim.physics.run_settings import REFERENCE_SPEED, Series, SettingsTable
-from tunnel_sim.vocabulary.record import Array, read_only
+from tunnel_sim.vocabulary.record import Array
 
 
 @dataclass(frozen=True)
@@ -287,67 +286,44 @@ def _faster(series: Mapping[str, Series], grown: float) -> Mapping[str, Series]:
 
 
 _SAMPLES = 201  # of an exponential drift, linear in between: within 1e-4 of the drift up to k = 5
-_SETTLED = 14.0  # time constants after which a wind has settled: within 1e-6
-_BY_TIME_CONSTANT = 40  # samples: within 1e-6 of the drift, on average
-_QUICK, _SLOW = 0.5, 3.0  # s, time constants of fans and doors from which a fit starts
 
 
 @dataclass(frozen=True)
 class WindSpeedDrift(Effect):
-    """A wind speed that drifts during the run, or settles after the release."""
+    """A wind speed that drifts during the run."""
 
     name = "wind_speed_drift"
     place = 10
     channel = "stiffness"
     condition = "wind_on"
     advice = "Keep the wind speed constant during the run, or record it"
-    equation = (
-        f"V(t) = V (1 + d t/T) over a run of length T; general forms: {EQUATION} for t/T, and a wind that settles, "
-        "V (1 − d e^(−t/τ)), whose stated speed V is the final one; k is then not used; V(t) ≥ 0"
-    )
+    equation = "V(t) = V (1 + d t/T) over a run of length T; general form: " + EQUATION + " for t/T"
     signature = "The frequency of wind-on runs changes with time rather than with amplitude."
     references = ("Barlow, Rae & Pope, Low-Speed Wind Tunnel Testing, Wiley 1999",)
     example = (0.1,)
     autonomous = False
-    tries = 3
     caveat = (
-        "The stated wind speed counts as the speed at the release, and the uncertainty of Cnβ includes that it may "
-        "be the mean over the run. Of a wind that settles (τ above 0) it counts as the final speed."
+        "The stated wind speed counts as the speed at the release. The uncertainty of Cnβ includes that it may be "
+        "the mean over the run."
     )
 
     drift: float = parameter(
         "d", "1", "relative gain of speed over the run", scale=0.02, lower=-0.9, upper=5.0, relative=True
     )
-    settling: float = settling(fit_upper=1.0)  # a fit of a wind that settles further has a time constant
-    time_constant: float = parameter(
-        "τ", "s", "time constant of a wind that settles to its stated speed; 0: it drifts as stated by k",
-        scale=2.0, lower=0.0, upper=1e6, fit_lower=0.05, fit_upper=20.0, form=True, along_run=True,
-        own_law=True,
-    )  # fmt: skip
-
-    @classmethod
-    def forms(cls) -> tuple[tuple[str, ...], ...]:
-        """Another course of the drift, or a wind that settles."""
-        return (("settling",), ("time_constant",))
+    settling: float = settling()
 
     def unseen_form(self, cn_beta: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
         """Runs cannot show whether the stated speed holds at the release or is the mean over the run.
 
-        The truth may be between the two cases; their difference is a rectangular half-width. A wind that settles
-        has its stated speed in the end.
+        The truth may be between the two cases; their difference is a rectangular half-width.
         """
         mean = 1.0 + self.drift * mean_of_ramp(self.settling)
-        known = not runs or self.time_constant > 0.0
-        return (0.0 if known else abs(cn_beta * (mean**2 - 1.0)) / sqrt(3.0)), 0.0
+        return (abs(cn_beta * (mean**2 - 1.0)) / sqrt(3.0) if runs else 0.0), 0.0
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
-        """A linear drift, then winds that settle quickly and slowly; none in normalised form."""
-        if campaign.normalised:
-            return ()
-        scale = cls.parameters()[0].scale
-        settles = [Trial({"drift": scale, "time_constant": time}, "drift") for time in (_QUICK, _SLOW)]
-        return [*super().trials(campaign), *settles]
+        """None in normalised form."""
+        return () if campaign.normalised else super().trials(campaign)
 
     @classmethod
     def on_runs(
@@ -356,33 +332,16 @@ class WindSpeedDrift(Effect):
         """Replace the constant wind speeds by sampled drifts; two samples suffice where they are linear."""
         del drawn
         acts, duration = (stated.wind_speed > 0.0) & (cls.column(effects, "drift") != 0.0), stated["duration"]
+        shapes: dict[float, Array] = {}
         for place in np.flatnonzero(acts).tolist():
-            effect = effects[place]
-            course, length = _course(effect.settling, effect.time_constant, float(duration[place]))
-            speeds = np.maximum(0.0, runs.wind_speed[place] * (1.0 + effect.drift * course))
-            drifting = Series(tuple(speeds.tolist()), length / (course.size - 1))
+            drift, settling = effects[place].drift, effects[place].settling
+            if settling not in shapes:
+                count = 2 if settling == 0.0 else _SAMPLES
+                shapes[settling] = ramp(np.linspace(0.0, 1.0, count), settling)
+            part = shapes[settling]
+            speeds = runs.wind_speed[place] * (1.0 + drift * part)
+            drifting = Series(tuple(speeds.tolist()), float(duration[place]) / (part.size - 1))
             runs.series[place] = {**runs.series[place], "wind_speed": drifting}
-
-
-@lru_cache(maxsize=64)
-def _course(settling: float, time_constant: float, duration: float) -> tuple[Array, float]:
-    """The course of a drift of 1, sampled evenly, and the time from the first sample to the last.
-
-    Args:
-        settling: run length over the drift's time constant, dimensionless.
-        time_constant: of a wind that settles, s; 0: it does not.
-        duration: of the run, s.
-
-    Returns:
-        Change of the speed, shape (n,), and the time, s.
-    """
-    if time_constant > 0.0:
-        length = min(duration, _SETTLED * time_constant)
-        count = max(2, round(_BY_TIME_CONSTANT * length / time_constant))
-        since = np.linspace(0.0, length / time_constant, count)
-        # between its samples a line exceeds an exponential, on average by h²/12 of it
-        return read_only(-(1.0 - since[1] ** 2 / 12.0) * np.exp(-since)), length
-    return read_only(ramp(np.linspace(0.0, 1.0, 2 if settling == 0.0 else _SAMPLES), settling)), duration
 
 
 @dataclass(frozen=True)

@@ -44,8 +44,6 @@ class ParameterInfo:
         of_input: whether it relates the effect to the input of a driven run; values are tried and not fitted. Free
             decays do not depend on it.
         along_run: whether it shapes a change along the run.
-        own_law: whether its form is a law of its own, and not a departure from the textbook's: coefficients beside
-            the two then refer to different conditions, and do not show how much the form matters.
         of_load: whether it relates the effect to the moment that the joint carries; it can be fitted only where
             gravity or an actuator makes this moment vary.
         relative: whether it is a relative change, which people read in per cent; its unit is ``1``.
@@ -70,7 +68,6 @@ class ParameterInfo:
     inside: bool = False
     of_input: bool = False
     along_run: bool = False
-    own_law: bool = False
     of_load: bool = False
     relative: bool = False
     name: str = ""
@@ -132,16 +129,10 @@ def exponent(symbol: str, meaning: str, textbook: float, fit_lower: float = -inf
 EQUATION = "(1 − e^(−k t/T))/(1 − e^(−k))"
 
 
-def settling(fit_upper: float = inf) -> Any:
-    """The form parameter of a drift: run length over the time constant; 0: linear, the textbook form.
-
-    Args:
-        fit_upper: greatest value a fit may take, dimensionless.
-    """
-    return parameter(
-        "k", "1", "length of the run over the drift's time constant",
-        scale=1.0, lower=-30.0, upper=30.0, form=True, along_run=True, fit_upper=fit_upper,
-    )  # fmt: skip
+def settling() -> Any:
+    """The form parameter of a drift: run length over the time constant; 0: linear, the textbook form."""
+    meaning = "length of the run over the drift's time constant"
+    return parameter("k", "1", meaning, scale=1.0, lower=-30.0, upper=30.0, form=True, along_run=True)
 
 
 _LINEAR = 1e-3  # rate below which the first two terms of the mean's series are exact to 1e-12

@@ -17,7 +17,7 @@ NOMINAL = {"yaw_inertia": 0.1014, "mechanical_damping": 0.012, "cn_beta": 0.49, 
 #: Parameters that take finite differences: a law, or samples of the wind, that exist on one side only.
 BY_DIFFERENCES = {
     "coulomb_friction": {"exponent", "saturation", "peak", "load"},
-    "wind_speed_drift": {"settling", "time_constant"},
+    "wind_speed_drift": {"settling"},
 }
 #: Readings at times of their own: all parameters take differences.
 READ_BY_DIFFERENCES = {"dropped_samples"}

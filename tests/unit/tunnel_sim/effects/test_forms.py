@@ -71,17 +71,6 @@ def test_a_drifting_wind_settles() -> None:
     assert place[-1] == pytest.approx(10.0)
 
 
-@pytest.mark.parametrize(("time_constant", "length"), [(0.5, 7.0), (4.0, 10.0)])
-def test_a_wind_settles_to_its_stated_speed(time_constant: float, length: float) -> None:
-    effect = effect_from("wind_speed_drift", {"drift": 0.1, "time_constant": time_constant})
-    series = acting(effect, STATED).series["wind_speed"]
-    place = np.arange(len(series.values)) * series.interval
-    expected = STATED.wind_speed * (1.0 - 0.1 * np.exp(-place / time_constant))
-    assert np.array(series.values) == pytest.approx(expected, rel=1e-5)
-    assert place[-1] == pytest.approx(length)
-    assert effect.unseen_form(0.5, [WindOnRun(20.0, 9.0, 10.0, per_cn_beta=2.0, per_cn_r=0.5)]) == (0.0, 0.0)
-
-
 @pytest.mark.parametrize("speed", [10.0, 20.0, 30.0])
 def test_an_offset_and_a_misaligned_flow_follow_a_power_of_the_speed(speed: float) -> None:
     stated = dataclasses.replace(STATED, wind_speed=speed)
