@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, make_dataclass
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 from typer import Argument, Option
@@ -17,18 +17,15 @@ from typer import Argument, Option
 from tunnel_lab.report.import_table import parts_table
 from tunnel_lab.terminal.arguments import LeaveOutOption, ending, output_file, refuse_unwritable_files
 from tunnel_lab.terminal.outputs import say, say_sentence, say_written, show
-from tunnel_sim.vocabulary.errors import TunnelError, counted, one_of
-from tunnel_sim.vocabulary.input_kinds import INPUT_COLUMNS
+from tunnel_sim.files.importing.choice_options import CHOICES
+from tunnel_sim.vocabulary.errors import TunnelError, counted
 
 if TYPE_CHECKING:
     from tunnel_sim.files.importing.choices import ImportChoices
     from tunnel_sim.files.importing.records import Imported
 
-_column = partial(Option, rich_help_panel="Columns")
-_unit = partial(Option, rich_help_panel="Units")
-_runs = partial(Option, rich_help_panel="Runs")
-_condition = partial(Option, rich_help_panel="Conditions")
 _output = partial(Option, rich_help_panel="Output")
+StatedT = TypeVar("StatedT")
 
 
 def _number(option: str) -> Callable[[str], float]:
@@ -45,112 +42,76 @@ def _number(option: str) -> Callable[[str], float]:
     return parsed
 
 
+def _with_choices(own: type[StatedT]) -> type[StatedT]:
+    """A dataclass of options with an option for each of `CHOICES` before its own."""
+    options: list[tuple[str, Any, Any]] = []
+    for key, words in CHOICES.items():
+        flag, kind = f"--{key.replace('_', '-')}", words.kind
+        option = Option(
+            *(() if kind is bool else (flag,)),  # Typer names both options of a truth value
+            metavar=words.metavar or None,
+            help=words.help,
+            parser=_number(flag) if kind is float else None,
+            show_default=flag if kind is bool else True,
+            rich_help_panel=words.group,
+        )
+        given: Any = tuple[kind, ...] if words.several else kind | None  # type: ignore[valid-type]  # known when it runs
+        options.append((key, Annotated[given, option], () if words.several else None))
+    chosen = make_dataclass("ImportOptions", options, frozen=True)
+    return dataclass(frozen=True)(type(own.__name__, (own, chosen), {"__doc__": own.__doc__}))
+
+
+@_with_choices
 @dataclass(frozen=True)
 class StatedChoices:
-    """How files are read, as options; `ImportChoices` has fields of these names and checks the values."""
+    """How files are read, as options; `ImportChoices` has the fields of `CHOICES` and checks the values."""
 
-    angle: Annotated[
-        tuple[str, ...],
-        _column(
-            "--angle",
-            metavar="NAME",
-            help="Column of the angle, by name or its number in the file. May be repeated.",
-        ),
-    ] = ()
-    unit: Annotated[
-        str | None, _unit("--unit", help="Unit of the angle: rad, mrad, deg, turns, counts, V, deg/s, …")
-    ] = None
-    input: Annotated[
-        str | None, _column("--input", metavar="NAME", help="Column of a driven run's input, or none.")
-    ] = None
-    input_as: Annotated[
-        str | None,
-        _column("--input-as", metavar="COLUMN", help=f"What the input is: {one_of(INPUT_COLUMNS)}."),
-    ] = None
-    input_hold: Annotated[
-        str | None,
-        _column("--input-hold", metavar="HOLD", help="The input between its samples: zero (held) or linear."),
-    ] = None
-    time: Annotated[
-        str | None, _column("--time", metavar="NAME", help="Column of the times, by name or number.")
-    ] = None
-    time_unit: Annotated[str | None, _unit("--time-unit", help="Unit of the times: s, ms, us, min, …")] = None
-    rate: Annotated[
-        float | None,
-        _unit(
-            "--rate", parser=_number("--rate"), metavar="HZ", help="Sample rate, where there are no times."
-        ),
-    ] = None
-    counts_per_turn: Annotated[
-        float | None,
-        _unit(
-            "--counts-per-turn",
-            parser=_number("--counts-per-turn"),
-            metavar="NUMBER",
-            help="Counts of an encoder per turn.",
-        ),
-    ] = None
-    calibration: Annotated[
-        str | None,
-        _unit(
-            "--calibration",
-            metavar="'a + b*V'",
-            help="Volts to angle: a formula, also 'b*(V - c)', or a file of two columns.",
-        ),
-    ] = None
     table: Annotated[
         Path | None,
-        _condition(
-            "--conditions", metavar="RUNS.csv", help="Table of conditions: file or run, wind_speed, …"
-        ),
-    ] = None
-    name: Annotated[
-        str | None,
-        _condition(
-            "--name", metavar="PATTERN", help="Conditions in the file names: S{spring}_V{wind_speed}_*"
+        Option(
+            "--conditions",
+            metavar="RUNS.csv",
+            rich_help_panel="Conditions",
+            help="Table of conditions: file or run, wind_speed, …",
         ),
     ] = None
     settings: Annotated[
         tuple[str, ...],
-        _condition(
+        Option(
             "--set",
             metavar="KEY=NUMBER",
+            rich_help_panel="Conditions",
             help="A condition of all runs, or a size, also with a unit. KEY=NAME names the column or variable that "
             "states it. May be repeated.",
         ),
     ] = ()
     start: Annotated[
         tuple[str, ...],
-        _runs(
-            "--start", metavar="[RUN=]S", help="First time of all files, or of one run, s. May be repeated."
+        Option(
+            "--start",
+            metavar="[RUN=]S",
+            rich_help_panel="Runs",
+            help="First time of all files, or of one run, s. May be repeated.",
         ),
     ] = ()
     end: Annotated[
         tuple[str, ...],
-        _runs("--end", metavar="[RUN=]S", help="Last time of all files, or of one run, s. May be repeated."),
-    ] = ()
-    rest: Annotated[
-        float | None,
-        _condition(
-            "--rest",
-            parser=_number("--rest"),
-            metavar="RAD",
-            help="Reading at rest of every run: it is subtracted.",
+        Option(
+            "--end",
+            metavar="[RUN=]S",
+            rich_help_panel="Runs",
+            help="Last time of all files, or of one run, s. May be repeated.",
         ),
-    ] = None
+    ] = ()
     leave_out: LeaveOutOption = ()
-    cut: Annotated[
-        bool | None, _runs("--cut/--no-cut", help="Cut records at releases.", show_default="--cut")
-    ] = None
-    delimiter: Annotated[
-        str | None,
-        _column("--delimiter", metavar="SIGN", help="Delimiter of a text file: tab, blank, ';', ',' or '|'."),
-    ] = None
-    decimal: Annotated[
-        str | None, _column("--decimal", metavar="SIGN", help="Decimal sign of a text file: ',' or '.'.")
-    ] = None
     recipe: Annotated[
-        Path | None, _column("--recipe", metavar="import.toml", help="Choices of an earlier import.")
+        Path | None,
+        Option(
+            "--recipe",
+            metavar="import.toml",
+            rich_help_panel="Columns",
+            help="Choices of an earlier import.",
+        ),
     ] = None
 
     def choices(self) -> ImportChoices:

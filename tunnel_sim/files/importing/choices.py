@@ -6,11 +6,12 @@ import re
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import Field
 
 from tunnel_sim.files.campaign_folder import IMPORT_RECIPE
+from tunnel_sim.files.importing.choice_options import CHOICES
 from tunnel_sim.files.importing.condition_names import Conditions, in_si, units_of
 from tunnel_sim.files.importing.units import known_unit
 from tunnel_sim.files.plausible import plausible_values
@@ -23,8 +24,8 @@ from tunnel_sim.files.toml_input import (
     read_document,
     validate,
 )
-from tunnel_sim.vocabulary.errors import TunnelError, one_line, one_of
-from tunnel_sim.vocabulary.input_kinds import INPUT_COLUMNS, InputColumn
+from tunnel_sim.vocabulary.errors import TunnelError, one_line
+from tunnel_sim.vocabulary.input_kinds import InputColumn
 from tunnel_sim.vocabulary.inputs import Hold
 
 
@@ -48,58 +49,44 @@ class Stretch(StrictModel):
     record: OneLine | None = optional("the name of the record, where its run is added to the others")
 
 
+def _choice(key: str, **default: Any) -> Any:
+    """A field with the words of `CHOICES`; None by default."""
+    words = CHOICES[key]
+    return Field(**{"default": None} | default, title=words.title, description=words.wanted)
+
+
 class ImportChoices(StrictModel):
     """How files are read; None: found from the files."""
 
-    time: OneLine | None = optional("the name or number of the column of times", "Column of the times")
-    angle: tuple[OneLine, ...] = Field(
-        default=(),
-        strict=False,
-        title="Column of the angle",
-        description="a list of names or numbers of columns",
-    )
-    unit: OneLine | None = optional("the unit of the angle, such as 'deg'", "Unit of the angle")
-    time_unit: OneLine | None = optional("the unit of the times, such as 'ms'", "Unit of the times")
-    rate: SampleRate | None = optional("a positive number in Hz", "Sample rate [Hz]")
-    counts_per_turn: Positive | None = optional("a positive number", "Counts of an encoder per turn")
-    calibration: OneLine | None = optional(
-        "a formula such as '0.1 + 20*V', or the name of a table of two columns",
-        "Angle of a voltage",
-    )
-    delimiter: Literal["tab", ";", ",", "|", "blank"] | None = optional(
-        "'tab', ';', ',', '|' or 'blank'", "Delimiter of a text file"
-    )
-    decimal: Literal[".", ","] | None = optional("'.' or ','", "Decimal sign of a text file")
+    time: OneLine | None = _choice("time")
+    angle: tuple[OneLine, ...] = _choice("angle", default=(), strict=False)
+    unit: OneLine | None = _choice("unit")
+    time_unit: OneLine | None = _choice("time_unit")
+    rate: SampleRate | None = _choice("rate")
+    counts_per_turn: Positive | None = _choice("counts_per_turn")
+    calibration: OneLine | None = _choice("calibration")
+    delimiter: Literal["tab", ";", ",", "|", "blank"] | None = _choice("delimiter")
+    decimal: Literal[".", ","] | None = _choice("decimal")
     start: float | None = optional(
         "a time of the file in s: earlier samples are left out", "Leave out samples before [s]"
     )
     end: float | None = optional(
         "a time of the file in s: later samples are left out", "Leave out samples after [s]"
     )
-    rest: float | None = optional(
-        "the reading at rest in rad, to be subtracted from every run", "Reading at rest [rad]"
-    )
-    input: OneLine | None = optional(
-        "the name of the input's column of a driven run, or 'none'", "Column of a driven run's input"
-    )
-    input_as: InputColumn | None = optional(
-        one_of([f"'{name}'" for name in INPUT_COLUMNS]), "What the input is"
-    )
-    input_hold: Hold | None = optional("'zero' or 'linear'", "The input between its samples")
+    rest: float | None = _choice("rest")
+    input: OneLine | None = _choice("input")
+    input_as: InputColumn | None = _choice("input_as")
+    input_hold: Hold | None = _choice("input_hold")
     leave_out: tuple[OneLine, ...] = Field(
         default=(), strict=False, title="Leave out", description="a list of names of runs or files"
     )
-    cut: bool = Field(
-        default=True, title="Cut records at releases", description="false to keep records whole"
-    )
+    cut: bool = _choice("cut", default=True)
     stretches: tuple[Stretch, ...] = Field(
         default=(),
         strict=False,
         description="[[choices.stretches]] tables with file, run, start, end and rest",
     )
-    name: OneLine | None = optional(
-        "a pattern of file names such as 'S{spring}_V{wind_speed}_*'", "Conditions in the file names"
-    )
+    name: OneLine | None = _choice("name")
     conditions: Conditions = Field(
         default=Conditions(), title="Conditions of all runs", description="a [choices.conditions] table"
     )
