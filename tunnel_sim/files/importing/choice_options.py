@@ -1,6 +1,6 @@
 """The choices of an import in words: for a recipe, for a field of a page, and for an option of the command line.
 
-The command line answers before pydantic is loaded, so the words are here and not in `ImportChoices`, which has them.
+The command line answers before pydantic is loaded, so the words are here and not in `ImportChoices`.
 """
 
 from __future__ import annotations
