@@ -130,6 +130,8 @@ def _as_numbers(
     remarks = [*run.remarks, *time.why, *reading.why, *(() if driven is None else driven.why)]
     if table.native:
         remarks += _apart(table, channel, driven, choices, where)
+        if driven is not None and (how := table.aligned.get(driven.channel.name)) is not None:
+            remarks.append(how)
         if driven is not None and (outside := _without_input(reading, driven)).any():
             remarks.append(f"{driven.channel.quoted} has no sample at {outside.sum()} of {rows}: left out")
             reading = replace(reading, values=np.where(outside, np.nan, reading.values))

@@ -100,6 +100,7 @@ class Table:
         native: names of the columns that were sampled on the clock of the table, where the columns of a part have
             several clocks; the part then has a table for each of them. Empty: all columns.
         apart: name, unit and reason of each column of the part that cannot be aligned with the clock of the table.
+        aligned: by column of another clock that was put onto the clock of the table: how, and how far off.
     """
 
     channels: tuple[Channel, ...]
@@ -111,6 +112,7 @@ class Table:
     texts: Mapping[str, str] = field(default_factory=dict)
     native: tuple[str, ...] = ()
     apart: tuple[tuple[str, str, str], ...] = ()
+    aligned: Mapping[str, str] = field(default_factory=dict)
 
 
 def names_runs(heading: str) -> bool:
