@@ -139,7 +139,7 @@ def one_of(names: Sequence[str]) -> str:
 
 
 EXTRAS = {
-    "import": ("fastexcel", "xlsxwriter", "h5py", "nptdms"),
+    "import": ("fastexcel", "xlsxwriter", "h5py", "nptdms", "mcap", "rosbags", "asammdf"),
     "frames": ("pandas", "pyarrow", "xarray", "uncertainties"),
     "arviz": ("arviz_base",),
     "film": ("imageio", "imageio_ffmpeg"),
