@@ -69,7 +69,7 @@ def _read_mcap(content: bytes, where: str) -> list[Table]:
 
         def messages() -> Iterator[tuple[_Topic, int, bytes]]:
             schemas: dict[int, Any] = {}
-            ended = False
+            ended, count, stated = False, 0, None
             for record in streams.StreamReader(io.BytesIO(content), validate_crcs=True).records:
                 if isinstance(record, records.Schema):
                     schemas[record.id] = record
@@ -85,11 +85,17 @@ def _read_mcap(content: bytes, where: str) -> list[Table]:
                     if record.message_encoding not in _CDR:
                         own.skipped = f"its messages are {one_line(record.message_encoding, 20)}, not CDR"
                     topics.setdefault(record.id, own)
+                elif isinstance(record, records.Statistics):
+                    stated = record.message_count
                 elif isinstance(record, records.Message):
+                    count += 1
                     yield topics[record.channel_id], record.log_time, record.data
                 ended |= isinstance(record, records.Footer)
             if not ended:
                 raise TunnelError("is cut off: it has no end", where=where, remedy=_REMEDY)
+            if stated not in (None, count):
+                what = f"is damaged: it has {count} of {counted(stated, 'message')}"
+                raise TunnelError(what, where=where, remedy=_REMEDY)
 
         return _tables(messages(), topics.values(), "MCAP file", where)
 
