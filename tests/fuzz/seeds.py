@@ -22,6 +22,7 @@ from diagnosis.where.described import Where
 from tests.fuzz.campaigns import free_decays
 from tests.fuzz.tables import parquet
 from tests.fuzz.values import odd_words
+from tests.support.robot_logs import JOINT_STATE, START_NS, Mdf, joint_state, write_db3, write_mcap
 from tests.support.small_sweep import SMALL
 
 _TESTS = Path(__file__).parents[1]
@@ -345,6 +346,26 @@ def logger_file(name: str) -> bytes:
             with TdmsWriter(path) as file:
                 columns = [ChannelObject("run", column.name, column.to_numpy()) for column in run_frame()]
                 file.write_segment(columns)
+        elif path.suffix in (".mcap", ".db3", ".mf4"):
+            _write_log(path)
         else:
             path.write_bytes(run_file(name))
         return path.read_bytes()
+
+
+def _write_log(path: Path) -> None:
+    """The seed run as joint states, or as a channel group."""
+    time, angle = (run_frame()[name].to_numpy() for name in ("time_s", "yaw_rad"))
+    stamps = [START_NS + round(1e9 * t) for t in time]
+    messages = [
+        ("/joint_states", JOINT_STATE, stamp, joint_state(stamp, ["elbow"], [y]))
+        for stamp, y in zip(stamps, angle, strict=True)
+    ]
+    if path.suffix == ".mf4":
+        made = Mdf()
+        made.group("joint", time, angle=("rad", angle, None))
+        path.write_bytes(made.data)
+    elif path.suffix == ".db3":
+        write_db3(path, messages)
+    else:
+        write_mcap(path, messages)

@@ -98,8 +98,9 @@ def import_hdf5(folder: Path, draw: Draw) -> None:
 
 
 def import_file(folder: Path, draw: Draw) -> None:
-    """A MAT, HDF5, Excel, TDMS or Parquet file changed."""
-    name = draw(st.sampled_from(("log.mat", "log.h5", "log.xlsx", "log.tdms", "log.parquet")))
+    """A MAT, HDF5, Excel, TDMS, Parquet, MCAP, rosbag2 or MDF file changed."""
+    endings = (".mat", ".h5", ".xlsx", ".tdms", ".parquet", ".mcap", ".db3", ".mf4")
+    name = f"log{draw(st.sampled_from(endings))}"
     content = seeds.logger_file(name)
     _read_log(written(folder / name, draw(spoilt_bytes(content) | damaged(content)), draw))
 

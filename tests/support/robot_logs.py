@@ -1,4 +1,4 @@
-"""Logs of ROS 2 and MDF files, written without the libraries that read them: by the standards, byte by byte."""
+"""Logs of ROS 2 and MDF files; messages, SQLite and MDF are written by the standards, byte by byte."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 
+import mcap.writer
 import numpy as np
 
 START_NS = 1_700_000_000_000_000_000
@@ -87,6 +88,20 @@ def write_db3(path: Path, messages: Sequence[Message]) -> None:
             [(number_of[name], stamp, content) for name, _, stamp, content in messages],
         )
         data.commit()
+
+
+def write_mcap(path: Path, messages: Sequence[Message]) -> None:
+    """An MCAP file with the definitions of its messages."""
+    with path.open("wb") as stream:
+        writer = mcap.writer.Writer(stream)
+        writer.start("ros2", "tests")
+        channels: dict[str, int] = {}
+        for topic, kind, stamp, content in messages:
+            if topic not in channels:
+                schema = writer.register_schema(kind, "ros2msg", DEFINITIONS[kind].encode())
+                channels[topic] = writer.register_channel(topic, "cdr", schema)
+            writer.add_message(channels[topic], stamp, content, stamp)
+        writer.finish()
 
 
 class Mdf:

@@ -5,11 +5,11 @@ Truth: the numbers that were written, and the import of the same numbers as CSV.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-import mcap.writer
 import numpy as np
 import pytest
 import rosbags.rosbag2
@@ -18,7 +18,6 @@ from rosbags.typesys import Stores, get_typestore
 
 from tests.support.import_files import decay, written
 from tests.support.robot_logs import (
-    DEFINITIONS,
     FLOAT64,
     JOINT_STATE,
     START_NS,
@@ -26,10 +25,12 @@ from tests.support.robot_logs import (
     joint_state,
     number,
     write_db3,
+    write_mcap,
 )
 from tunnel_lab.cli import main
 from tunnel_sim import TunnelError
 from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.formats.robot_logs import MCAP
 from tunnel_sim.files.importing.records import Imported, read_records
 from tunnel_sim.files.importing.writing import import_records
 
@@ -63,16 +64,7 @@ def states(
 
 def by_mcap(folder: Path, messages: Sequence[Message]) -> Path:
     path = folder / "log.mcap"
-    with path.open("wb") as stream:
-        writer = mcap.writer.Writer(stream)
-        writer.start("ros2", "tests")
-        channels = {}
-        for topic, kind, stamp, content in messages:
-            if topic not in channels:
-                schema = writer.register_schema(kind, "ros2msg", DEFINITIONS[kind].encode())
-                channels[topic] = writer.register_channel(topic, "cdr", schema)
-            writer.add_message(channels[topic], stamp, content, stamp)
-        writer.finish()
+    write_mcap(path, messages)
     return path
 
 
@@ -237,6 +229,16 @@ def test_other_topics_are_left_out_with_the_reason(tmp_path: Path) -> None:
     others: list[Message] = [("/plan", "my_msgs/msg/Plan", START_NS, b"\0\1\0\0")]
     lines = read_records([by_sqlite(tmp_path, [*states(), *others])]).remarks()
     assert any("'/plan' is left out: its type my_msgs/msg/Plan is not known" in line for line in lines)
+
+
+@pytest.mark.parametrize("module", ["mcap", "rosbags"])
+def test_a_missing_library_is_said(module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = by_mcap(tmp_path, states()[:20])
+    for name in ("mcap.stream_reader", "rosbags.typesys"):
+        if name.startswith(module):
+            monkeypatch.setitem(sys.modules, name, None)
+    with pytest.raises(TunnelError, match=rf"needs the package {module}.*pip install '\.\[import\]'"):
+        MCAP.read_tables(path.read_bytes(), path.name)
 
 
 def test_a_log_without_numbers_lists_its_topics(tmp_path: Path) -> None:
