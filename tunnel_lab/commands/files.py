@@ -170,10 +170,11 @@ def import_files(
     """Make a campaign from the files of a data logger, a spreadsheet or MATLAB.
 
     Text of any dialect, LVM, Excel, MAT, TDMS, HDF5, Parquet, JSON, MDF 4 and logs of
-    ROS 2 (MCAP, rosbag2) are read, also compressed (.csv.gz). Columns, units, sample rate, runs and releases are detected;
-    the choices and their reasons are printed before anything is written, at the end
-    the points to check, each with the option that settles it. The campaign has a
-    picture (import.png), the choices (import.toml, for --recipe), and comments in
+    ROS 2 (MCAP, rosbag2) are read, also compressed (.csv.gz). Columns, units, sample
+    rate, runs and releases are detected; the choices and their reasons are printed
+    before anything is written, at the end the points to check, each with the option
+    that settles it. The campaign has a picture (import.png), the choices
+    (import.toml, for --recipe), and comments in
     campaign.toml on conditions that the files do not state, such as the stiffness.
 
     [bold]Examples[/bold]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from contextlib import closing
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -42,7 +43,7 @@ def _read(content: bytes, where: str) -> list[Table]:
                 continue
             clocks.append(_columns(file, number, name, clock, where))
     tables = stamped_tables(clocks, "MDF file", where)
-    return [Table(**vars(table) | {"remarks": (*table.remarks, *left_out)}) for table in tables]
+    return [replace(table, remarks=(*table.remarks, *left_out)) for table in tables]
 
 
 def _text(stated: Any) -> str:

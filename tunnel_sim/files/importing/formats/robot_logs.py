@@ -6,7 +6,7 @@ import io
 import sqlite3
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -41,23 +41,21 @@ _CDR = ("cdr", "")
 _REMEDY = "record it again, or recover it by `mcap recover` or `ros2 bag reindex`"
 
 
-@dataclass(eq=False)
 class _Topic:
-    """The messages of a topic so far.
+    """The messages of a topic that were read so far.
 
     Args:
         definition: of its type as text, and the language of the text; empty: the type is one of ROS itself.
-        columns: by name, the numbers of messages and their values.
     """
 
-    name: str
-    type: str
-    definition: str = ""
-    language: str = ""
-    log_ns: list[int] = field(default_factory=list)
-    header_ns: list[int] = field(default_factory=list)
-    columns: dict[str, tuple[str, list[int], list[float]]] = field(default_factory=dict)
-    skipped: str = ""
+    def __init__(self, name: str, type: str, definition: str = "", language: str = "") -> None:
+        self.name, self.type, self.definition, self.language = name, type, definition, language
+        self.log_ns: list[int] = []
+        self.header_ns: list[int] = []
+        self.columns: dict[str, tuple[str, list[int], list[float]]] = {}
+        """By name: the unit, the places of the messages that have a number, and the numbers."""
+        self.skipped = ""
+        """Why its messages are not read; empty: they are."""
 
 
 def _read_mcap(content: bytes, where: str) -> list[Table]:
@@ -147,7 +145,7 @@ def _tables(
         raise TunnelError(what, where=where, remedy="record joint states, sensor_msgs/msg/JointState")
     tables = stamped_tables(_clocks(read), kind, where)
     skipped = [f"'{topic.name}' is left out: {topic.skipped}" for topic in topics if topic.skipped]
-    return [Table(**vars(table) | {"remarks": (*table.remarks, *skipped)}) for table in tables]
+    return [replace(table, remarks=(*table.remarks, *skipped)) for table in tables]
 
 
 def _add(topic: _Topic, log_ns: int, raw: bytes, decoders: dict[str, Any], where: str) -> None:
