@@ -174,8 +174,8 @@ def import_files(
     rate, runs and releases are detected; the choices and their reasons are printed
     before anything is written, at the end the points to check, each with the option
     that settles it. The campaign has a picture (import.png), the choices
-    (import.toml, for --recipe), and comments in
-    campaign.toml on conditions that the files do not state, such as the stiffness.
+    (import.toml, for --recipe), and comments in campaign.toml on conditions that the
+    files do not state, such as the stiffness.
 
     [bold]Examples[/bold]
       tunnel import log.csv --out my-rig

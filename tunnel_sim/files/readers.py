@@ -123,5 +123,5 @@ def faults(kind: str, where: str) -> Iterator[None]:
         # A panic of a library in Rust is not a subclass of Exception, and has no name to import.
         if not isinstance(error, Exception) and type(error).__name__ != "PanicException":
             raise
-        what = f"is not {kind} that can be read ({one_line(error, 60)})"
+        what = f"is not {kind} that can be read ({one_line(str(error) or type(error).__name__, 60)})"
         raise TunnelError(what, where=where, remedy="export it again, or as text") from None

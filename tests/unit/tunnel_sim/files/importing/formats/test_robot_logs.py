@@ -268,4 +268,5 @@ def test_a_broken_log_is_refused_in_one_line(
     assert (status, out) == (2, "")
     assert err.count("\n") == 1
     assert path.name in err
+    assert "()" not in err
     assert not (tmp_path / "rig").exists()
