@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from tunnel_sim.files.importing.formats.stamps import StampedColumns, in_order, stamped_tables
-from tunnel_sim.files.importing.tables import Channel, Table
+from tunnel_sim.files.importing.tables import LEAST_ROWS, Channel, Table
 from tunnel_sim.files.readers import Reader, faults
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.vocabulary import limits
@@ -182,7 +182,7 @@ def _add(topic: _Topic, log_ns: int, raw: bytes, decoders: dict[str, Any], where
             rows.append(at)
             values.append(value)
     check_count(len(topic.columns), limits.COLUMNS, "columns", where, "record fewer topics")
-    if not topic.columns:
+    if not topic.columns and at >= LEAST_ROWS:  # the first messages may be empty
         topic.skipped = f"its messages {one_line(topic.type, 60)} hold no numbers that are read"
 
 

@@ -218,6 +218,13 @@ def test_the_log_stamps_count_where_only_one_clock_is_simulated(tmp_path: Path) 
     assert any("from the log stamps, because" in line for line in imported.remarks())
 
 
+def test_an_empty_first_message_does_not_hide_a_topic(tmp_path: Path) -> None:
+    first, *others = states()
+    empty = joint_state(STAMPS[0], (), ())
+    (run,) = read_records([by_mcap(tmp_path, [(*first[:3], empty), *others])]).campaign.runs
+    np.testing.assert_array_equal(run.record.yaw_rad, ANGLE[1:])
+
+
 def test_messages_that_a_recorder_compressed_are_read(tmp_path: Path) -> None:
     pack = zstandard.ZstdCompressor().compress
     log = by_sqlite(tmp_path, [(*head, pack(content)) for *head, content in states()])
