@@ -13,9 +13,9 @@ from diagnosis.diagnosable import comparable_runs, diagnosable
 from diagnosis.findings.candidates import candidates
 from diagnosis.findings.next_run import NextRun
 from diagnosis.likelihood.least_squares import Fit, FitError, fit
+from diagnosis.search.answer import Answer
 from diagnosis.search.hypothesis import Hypothesis, polish, restricted
 from diagnosis.search.investigate import nominal_study
-from diagnosis.search.study import Answer
 from diagnosis.settings import Settings
 from identification.show.numbers import plain
 from identification.show.quantity import Quantity

@@ -57,9 +57,9 @@ from diagnosis.patch.written_model import PatchedModel
 from diagnosis.remainder.closable import Closable
 from diagnosis.remainder.ways import way_for
 from diagnosis.result import Diagnosis
+from diagnosis.search.answer import UNKNOWN, Answer
 from diagnosis.search.clock import Progress
-from diagnosis.search.study import Answer, Study
-from diagnosis.search.weigh import UNKNOWN
+from diagnosis.search.study import Study
 from diagnosis.settings import AnswerSettings
 from diagnosis.where.described import Nowhere, PlaceFound, Where, described, nowhere
 from diagnosis.where.maps import Maps

@@ -26,8 +26,8 @@ from diagnosis.findings.candidates import meant_coefficient
 from diagnosis.findings.hidden import Hidden, hidden_effects
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.model.similarity import Similarity
-from diagnosis.search.study import Answer, Study
-from diagnosis.search.weigh import UNKNOWN
+from diagnosis.search.answer import UNKNOWN, Answer
+from diagnosis.search.study import Study
 from diagnosis.settings import AnswerSettings
 from identification.estimate import Estimate
 from identification.show.quantity import Quantity

@@ -20,10 +20,10 @@ from diagnosis.findings.terms import answer_name, scattering
 from diagnosis.findings.units import own_parameters
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import linear_coefficients
+from diagnosis.search.answer import UNKNOWN, Answer
 from diagnosis.search.prepared import COARSE_STEP, HUM
 from diagnosis.search.random_spectra import LONGEST_BANDWIDTH
-from diagnosis.search.study import Answer, Study
-from diagnosis.search.weigh import UNKNOWN
+from diagnosis.search.study import Study
 from diagnosis.settings import GapSettings
 from identification.show.blocks import TextTable
 from identification.show.drawing import ACCENT, NARROW, QUIET

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from diagnosis.findings.finding import Judged, Picture
 from diagnosis.findings.hidden import Hidden
-from diagnosis.search.weigh import UNKNOWN
+from diagnosis.search.answer import UNKNOWN
 from identification.printing import COEFFICIENTS, coefficient_label
 from identification.show.blocks import TextTable
 from identification.show.drawing import AFTER, BEFORE, NARROW

@@ -20,7 +20,7 @@ from diagnosis.findings.terms import (
 )
 from diagnosis.findings.verdict import headline
 from diagnosis.findings.whole import Findings
-from diagnosis.search.weigh import UNKNOWN
+from diagnosis.search.answer import UNKNOWN
 from identification.printing import COEFFICIENTS
 from identification.show.blocks import Pairs, Paragraph, Section
 from identification.show.numbers import (

@@ -15,8 +15,8 @@ from diagnosis.findings.terms import MISFITS
 from diagnosis.likelihood.residuals import CHANNELS, misfit
 from diagnosis.model.fact import Fact
 from diagnosis.noise.kinds import Noise
+from diagnosis.search.answer import UNKNOWN
 from diagnosis.search.study import Study
-from diagnosis.search.weigh import UNKNOWN
 from identification.show.numbers import plain, probability, relative_change, share
 from identification.show.quantity import Quantity
 from tunnel_sim.vocabulary.campaign import Campaign

@@ -16,7 +16,7 @@ from diagnosis.findings.repeatability import width_text
 from diagnosis.findings.spring_choices import choice_steps
 from diagnosis.findings.terms import CHANNELS, CONDITIONS, SCATTERS, without_scatter
 from diagnosis.findings.whole import Findings
-from diagnosis.search.weigh import UNKNOWN
+from diagnosis.search.answer import UNKNOWN
 from identification.printing import COEFFICIENTS
 from identification.show.numbers import listed, plain, relative_change, share, within
 from identification.show.quantity import Quantity

@@ -19,8 +19,8 @@ from diagnosis.likelihood.ceiling import Ceiling
 from diagnosis.noise.gap import gap_test
 from diagnosis.remainder.closable import Closable, Curve, Law, Line
 from diagnosis.remainder.explain import COMMON_FIRST
+from diagnosis.search.answer import UNKNOWN
 from diagnosis.search.study import Study
-from diagnosis.search.weigh import UNKNOWN
 from identification.printing import COEFFICIENTS
 from identification.show.blocks import TextTable
 from identification.show.drawing import AFTER, BEFORE, NARROW, colour_bar, faded

@@ -13,7 +13,7 @@ from diagnosis.answer.run_deviations import RunDeviations, RunRepeat, ScatterLim
 from diagnosis.findings.finding import Judged, NextStep, Picture
 from diagnosis.findings.terms import NUMBERS, SCATTERS, scattering, without_scatter
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.search.weigh import UNKNOWN
+from diagnosis.search.answer import UNKNOWN
 from identification.show.blocks import TextTable
 from identification.show.drawing import AFTER, BEFORE, INK, NARROW, NOISE, PAPER
 from identification.show.numbers import concise, listed, percent_of, plain, probability, rounded_up, with_std

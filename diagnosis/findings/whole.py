@@ -40,9 +40,9 @@ from diagnosis.findings.what_it_costs import WhatItCosts
 from diagnosis.model.fact import Fact, Noted
 from diagnosis.patch.written_model import PatchedModel
 from diagnosis.remainder.closable import Closable
+from diagnosis.search.answer import UNKNOWN
 from diagnosis.search.disturbance import Disturbance
 from diagnosis.search.rivals.two_springs import SpringError
-from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import Settings
 from diagnosis.where.described import Nowhere, PlaceFound, Where
 from diagnosis.where.maps import Maps

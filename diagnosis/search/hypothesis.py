@@ -17,7 +17,7 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, linear_coefficients, misfit, resonance
 from diagnosis.model.parameters import Point
 from diagnosis.search.process_noise import MomentLayer
-from diagnosis.search.weigh import FittedSet, least_excess, log_weight, misfit_scale
+from diagnosis.search.weights import FittedSet, least_excess, log_weight, misfit_scale
 from diagnosis.settings import WeighingSettings
 from tunnel_sim.effects.capabilities import OwnNumbers
 from tunnel_sim.vocabulary.record import Array

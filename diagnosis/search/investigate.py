@@ -11,6 +11,7 @@ from diagnosis.likelihood.least_squares import try_fit
 from diagnosis.model.choose import nominal_model
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.parameters import Point
+from diagnosis.search.answer import UNKNOWN
 from diagnosis.search.clock import Progress, StepClock
 from diagnosis.search.disturbed import prepared_undisturbed, together, undisturbed
 from diagnosis.search.odd_run import DISTURBED_SHARE, odd_runs
@@ -20,7 +21,6 @@ from diagnosis.search.sets import Sets, with_near_rivals
 from diagnosis.search.study import Gap, Study
 from diagnosis.search.views import VIEWS
 from diagnosis.search.views.view import View
-from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import Settings
 from tunnel_sim.effects import ALL_EFFECTS, Effect
 from tunnel_sim.effects.capabilities import InputClock

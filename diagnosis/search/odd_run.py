@@ -22,6 +22,7 @@ from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.likelihood.without_run import WithoutRuns, refitted_without
 from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
+from diagnosis.search.answer import UNKNOWN
 from diagnosis.search.disturbance import Disturbance
 from diagnosis.search.hypothesis import Hypothesis, Scale
 from diagnosis.search.one_more import sets_with_one_more
@@ -29,7 +30,7 @@ from diagnosis.search.process_noise import acts_by, likeliest, random_moments, w
 from diagnosis.search.random_spectra import SOURCES
 from diagnosis.search.scatter import scattered
 from diagnosis.search.steady_noise import is_steady_noise
-from diagnosis.search.weigh import UNKNOWN, FittedSet, error_of_form, log_weight
+from diagnosis.search.weights import FittedSet, error_of_form, log_weight
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.base import SPRING_TOLERANCE
 from tunnel_sim.vocabulary.campaign import Campaign

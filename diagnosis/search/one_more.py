@@ -13,7 +13,7 @@ from diagnosis.likelihood.starting_points import StartingPoint, misses_motion, s
 from diagnosis.search.clock import Progress
 from diagnosis.search.hypothesis import Hypothesis, is_plausible, of_more_weight, own_gain, turned_back
 from diagnosis.search.scatter import likelier, with_likeliest_widths
-from diagnosis.search.weigh import log_weight, misfit_scale
+from diagnosis.search.weights import log_weight, misfit_scale
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.capabilities import SecondOscillation
 

@@ -32,7 +32,7 @@ from diagnosis.search.random_spectra import (
     of_surroundings,
     wandering,
 )
-from diagnosis.search.weigh import FittedSet
+from diagnosis.search.weights import FittedSet
 from diagnosis.settings import RandomMomentSettings
 from identification.signal.filter import discretised, steady_filters
 from tunnel_sim.effects import Effect

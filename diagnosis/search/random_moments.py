@@ -39,7 +39,7 @@ from diagnosis.search.random_spectra import SOURCES, MomentSource
 from diagnosis.search.runs_in_view import RunsInView
 from diagnosis.search.scatter import differing, with_likeliest_widths, without_deviations
 from diagnosis.search.steady_noise import is_a_line, is_slow, is_steady_noise
-from diagnosis.search.weigh import FittedSet, log_weight
+from diagnosis.search.weights import FittedSet, log_weight
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.capabilities import AtRandom, OwnNumbers
 

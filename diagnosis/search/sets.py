@@ -13,6 +13,7 @@ import numpy as np
 from diagnosis.likelihood.least_squares import Fit, FitError, fit, scaled_residuals, try_fit
 from diagnosis.likelihood.residuals import misfit
 from diagnosis.model.fact import Fact
+from diagnosis.search.answer import UNKNOWN, Answer
 from diagnosis.search.clock import StepClock
 from diagnosis.search.hypothesis import Hypothesis, restricted, with_forms
 from diagnosis.search.one_more import same_change, sets_with_one_more
@@ -20,7 +21,8 @@ from diagnosis.search.rivals.rival import FoundRival, Rival
 from diagnosis.search.runs_in_view import RunsInView
 from diagnosis.search.scatter import drifting, with_scatter
 from diagnosis.search.surviving import refusal
-from diagnosis.search.weigh import UNKNOWN, FittedSet, Weighed, weigh
+from diagnosis.search.weigh import weigh
+from diagnosis.search.weights import FittedSet
 
 RIVAL_FORMS: Final = 0.05
 """Minimum probability of a rival set for its forms to be freed. Judgement."""
@@ -57,7 +59,7 @@ class Sets:
     confirmed: Hypothesis | None = None
 
     @cached_property
-    def weighed(self) -> list[Weighed]:
+    def weighed(self) -> list[Answer]:
         """The answers with their probabilities, the answer first; shares are of the gap in the view."""
         base, prepared, nominal = self.view.base, self.view.prepared, self.view.gap
         sets = [self._fitted_set(one) for one in (*self.hypotheses, *self.random)]

@@ -12,6 +12,7 @@ from diagnosis.model.fact import Fact
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.similarity import Similarity
 from diagnosis.noise.gap import GapTest
+from diagnosis.search.answer import UNKNOWN, Answer
 from diagnosis.search.choices import Choice, choices
 from diagnosis.search.clock import StepClock
 from diagnosis.search.disturbance import Disturbance
@@ -22,7 +23,6 @@ from diagnosis.search.rivals.rival import FoundRival
 from diagnosis.search.scatter import evident, named, shown_by
 from diagnosis.search.sets import Names, Sets
 from diagnosis.search.surviving import shown_by_one
-from diagnosis.search.weigh import UNKNOWN, Weighed
 from diagnosis.settings import Settings
 from diagnosis.where.place import Place
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -51,39 +51,6 @@ class Gap:
 
     test: GapTest
     place: Place | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Answer(Weighed):
-    """An answer, its probability and its fits.
-
-    Args:
-        share: share of the gap that is unexplained, at least 0.
-        probability: among all answers weighed, a fraction.
-        hypothesis: its set, fitted to whole runs if it is the answer of the study or a part of it, else in the view
-            in which it was weighed. None where it is not a set of causes, or its fit to whole runs fails.
-        stated: the hypothesis with its parameters as stated, in the noise of the view where sets are weighed so.
-        choices: its choices that the runs cannot exclude.
-    """
-
-    hypothesis: Hypothesis | None = None
-    stated: Hypothesis | None = None
-    choices: tuple[Choice, ...] = ()
-
-    @property
-    def fit(self) -> Fit | None:
-        """The fit of its effects; None where it has none."""
-        return None if self.hypothesis is None else self.hypothesis.fit_of_answer
-
-    @property
-    def moment(self) -> MomentLayer | None:
-        """The random moment among its causes; None where there is none."""
-        return None if self.hypothesis is None else self.hypothesis.moment
-
-    def textbook_of(self, fit: Fit) -> Fit | None:
-        """The fit of its textbook form, where the given fit has its forms free; else None."""
-        own = self.hypothesis
-        return own.textbook if own is not None and own.moment is None and own.fit is fit else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,7 +216,7 @@ class Study:
         prepared = sets.view.prepared
         with clock.step("polishing"):
             whole = sets.in_whole_runs()
-        answers = [_answer(one, sets, whole) for one in _excused(sets, gap.test)]
+        answers = [_with_fits(one, sets, whole) for one in _excused(sets, gap.test)]
         with clock.step("choices"):
             answers = [replace(one, choices=_choices(one, sets)) for one in answers]
         first = answers[0]
@@ -284,33 +251,33 @@ def _less_certain(answers: Sequence[Answer]) -> list[Answer]:
     ]
 
 
-def _answer(weighed: Weighed, sets: Sets, whole: Mapping[Names, Hypothesis | None]) -> Answer:
+def _with_fits(answer: Answer, sets: Sets, whole: Mapping[Names, Hypothesis | None]) -> Answer:
     """An answer with its fits.
 
     Args:
         whole: sets fitted to whole runs, by names; None where that failed.
     """
-    names = weighed.effects
+    names = answer.effects
     in_view = sets.fitted(names)
     hypothesis = whole.get(names, in_view)
     at_random = sets.at_random(names, hypothesis)
     if at_random is not None:
-        return Answer(names, weighed.share, weighed.probability, at_random, at_random)
+        return replace(answer, hypothesis=at_random, stated=at_random)
     stated = in_view if sets.view.states_parameters else hypothesis
-    return Answer(names, weighed.share, weighed.probability, hypothesis, stated)
+    return replace(answer, hypothesis=hypothesis, stated=stated)
 
 
-def _excused(sets: Sets, test: GapTest) -> Sequence[Weighed]:
+def _excused(sets: Sets, test: GapTest) -> Sequence[Answer]:
     """The answers; where noise explains the gap, the causes detected in the records, or else none."""
     weighed, prepared = sets.weighed, sets.view.prepared
     if not sets.view.may_be_noise or not noise_explains(prepared.nominal, test, weighed):
         return weighed
-    answer = Weighed((), 1.0, 1.0) if prepared.read_off else Weighed(UNKNOWN, 1.0, 1.0)
+    answer = Answer((), 1.0, 1.0) if prepared.read_off else Answer(UNKNOWN, 1.0, 1.0)
     others = [replace(w, probability=0.0) for w in weighed if w.effects not in ((), UNKNOWN)]
     return [answer, *others]
 
 
-def noise_explains(nominal: Fit, test: GapTest, weighed: Sequence[Weighed]) -> bool:
+def noise_explains(nominal: Fit, test: GapTest, weighed: Sequence[Answer]) -> bool:
     """Whether misbehaving noise may be the whole of a small gap, or the shares of the gap are chance.
 
     Effects with few parameters explain little of any noise, however it misbehaves.

@@ -32,7 +32,8 @@ from diagnosis import Settings, diagnose
 from diagnosis.likelihood.residuals import ChannelMisfit
 from diagnosis.search import sets as weighed_sets
 from diagnosis.search import weigh as decide
-from diagnosis.search.weigh import UNKNOWN, FittedSet, Weighed
+from diagnosis.search.answer import UNKNOWN, Answer
+from diagnosis.search.weights import FittedSet
 from diagnosis.settings import WeighingSettings
 from tunnel_sim.effects import effect_class
 from tunnel_sim.files.campaign_folder import read_campaign
@@ -180,7 +181,7 @@ def _weighings(seen: list[tuple[Sequence[FittedSet], ChannelMisfit]]) -> Iterato
         nominal: ChannelMisfit,
         chosen: WeighingSettings,
         whole: ChannelMisfit | None = None,
-    ) -> list[Weighed]:
+    ) -> list[Answer]:
         seen.append((sets, nominal))
         return weigh(sets, nominal, chosen, whole)
 

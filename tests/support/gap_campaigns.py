@@ -21,9 +21,10 @@ from diagnosis.model.similarity import Similarity
 from diagnosis.noise.gap import GapTest, gap_or_colour
 from diagnosis.noise.mains import Hum
 from diagnosis.noise.sensor_noise import NoiseTrend, campaign_noise, noise_trend, reading_step
+from diagnosis.search.answer import Answer
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.prepared import COARSE_STEP, HUM, Prepared, fit_nominal
-from diagnosis.search.study import Answer, Gap, Study
+from diagnosis.search.study import Gap, Study
 from diagnosis.search.views.whole_runs import WholeRuns
 from diagnosis.settings import Settings
 from tunnel_sim.effects import ALL_EFFECTS, Effect, effect_class

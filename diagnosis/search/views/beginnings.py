@@ -22,7 +22,7 @@ from diagnosis.search.prepared import Prepared
 from diagnosis.search.sets import Sets
 from diagnosis.search.views.view import View
 from diagnosis.search.views.whole_runs import WholeRuns
-from diagnosis.search.weigh import OF_MOTION, log_misfit, misfit_scale
+from diagnosis.search.weights import OF_MOTION, log_misfit, misfit_scale
 from tunnel_sim.effects.capabilities import Clock
 
 COMPARED_FROM: Final = 0.01

@@ -13,12 +13,12 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import linear_coefficients
 from diagnosis.model.data import Data
 from diagnosis.model.run_noise import NoiseWithMoment
+from diagnosis.search.answer import UNKNOWN
 from diagnosis.search.clock import StepClock
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.prepared import Prepared
 from diagnosis.search.sets import Sets
 from diagnosis.search.views.view import View
-from diagnosis.search.weigh import UNKNOWN
 
 MOMENT_NOISE_FROM: Final = 0.05
 """Minimum probability of a set for its residual random moment to be modelled as noise. Judgement."""

@@ -13,6 +13,7 @@ from diagnosis.likelihood.least_squares import Fit, try_fit
 from diagnosis.likelihood.residuals import ChannelMisfit, gap_left, misfit
 from diagnosis.model.blocks import without_long_rest
 from diagnosis.model.chance import Scatter
+from diagnosis.search.answer import UNKNOWN
 from diagnosis.search.clock import StepClock
 from diagnosis.search.grow import levels
 from diagnosis.search.hypothesis import Hypothesis, Scale, of_more_weight, polish, with_forms
@@ -29,7 +30,7 @@ from diagnosis.search.scatter import (
 )
 from diagnosis.search.sets import Sets, prune, resolved
 from diagnosis.search.views.view import View
-from diagnosis.search.weigh import OF_MOTION, UNKNOWN, error_of_form, log_misfit, misfit_scale
+from diagnosis.search.weights import OF_MOTION, error_of_form, log_misfit, misfit_scale
 
 REACH_FROM: Final = 0.5
 """Unexplained share of the gap, for the best set of a size, above which the limit of larger sets is computed.

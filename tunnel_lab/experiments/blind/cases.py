@@ -12,7 +12,7 @@ from diagnosis.answer.run_deviations import Spread
 from diagnosis.findings.decision import Decision
 from diagnosis.findings.terms import SCATTERS
 from diagnosis.findings.whole import Findings
-from diagnosis.search.weigh import UNKNOWN
+from diagnosis.search.answer import UNKNOWN
 from identification.show.quantity import Quantity
 from identification.statistics import Proportion
 from tunnel_sim.effects import known_effects

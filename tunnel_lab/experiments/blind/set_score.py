@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from diagnosis.search.weigh import UNKNOWN
+from diagnosis.search.answer import UNKNOWN
 from identification.statistics import Proportion
 from tunnel_lab.experiments.blind.answers import answers_folder, scored
 from tunnel_lab.experiments.blind.cases import (

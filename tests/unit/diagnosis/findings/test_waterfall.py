@@ -20,11 +20,11 @@ from diagnosis.findings.candidates import Candidate, inclusion
 from diagnosis.likelihood.partial import fit_seen
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.data import FOLDS
+from diagnosis.search.answer import Answer
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.process_noise import MomentLayer, ProcessNoise
 from diagnosis.search.random_spectra import SpectrumPart
-from diagnosis.search.study import Answer
-from diagnosis.search.weigh import FittedSet
+from diagnosis.search.weights import FittedSet
 from diagnosis.settings import Settings
 from tests.support.gap_campaigns import NOISE, added, answer, nominal, studied
 from tunnel_sim.effects import effect_class

@@ -20,7 +20,7 @@ from diagnosis.search.process_noise import MomentLayer, with_response
 from diagnosis.search.random_moments import excess_elsewhere, is_no_noise, obeys_a_law, weigh_random_moments
 from diagnosis.search.random_spectra import BROAD, CENTRED, STREAM, SpectrumPart, wandering
 from diagnosis.search.steady_noise import bursts, departure_from_white, is_steady_noise, of_all_runs
-from diagnosis.search.weigh import FittedSet
+from diagnosis.search.weights import FittedSet
 from diagnosis.settings import Settings
 from tests.marks import slow
 from tests.reference.linear_rig import response

@@ -12,6 +12,7 @@ import pytest
 from diagnosis.answer.held_out import excess_base
 from diagnosis.noise.gap import GapTest
 from diagnosis.noise.mains import Hum
+from diagnosis.search.answer import UNKNOWN, Answer
 from diagnosis.search.clock import StepClock
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.prepared import HUM_LEFT
@@ -20,7 +21,7 @@ from diagnosis.search.sets import Sets, resolved
 from diagnosis.search.study import Study, noise_explains
 from diagnosis.search.views import by_moment as moments
 from diagnosis.search.views.whole_runs import WholeRuns
-from diagnosis.search.weigh import UNKNOWN, FittedSet, Weighed
+from diagnosis.search.weights import FittedSet
 from diagnosis.settings import Settings
 from tests.support.gap_campaigns import campaign, nominal, studied
 from tunnel_sim.effects import effect_class, effect_from
@@ -71,7 +72,7 @@ def test_the_answer_is_polished_unless_a_random_moment_gives_it(
     study: Study, monkeypatch: pytest.MonkeyPatch, random: bool
 ) -> None:
     sets = weighed(study, shedding(0.4) if random else None)
-    vars(sets)["weighed"] = [Weighed(("vortex_shedding",), 0.5, 0.9)]
+    vars(sets)["weighed"] = [Answer(("vortex_shedding",), 0.5, 0.9)]
     polished = replace(sets.hypotheses[0], textbook=study.nominal)
     monkeypatch.setattr("diagnosis.search.views.whole_runs.polish", lambda _: polished)
     found = sets.in_whole_runs()[("vortex_shedding",)]
@@ -81,7 +82,7 @@ def test_the_answer_is_polished_unless_a_random_moment_gives_it(
 def test_an_answer_that_is_read_off_the_records_is_settled_without_a_fit(study: Study) -> None:
     """It is no set of effects, so that nothing is fitted to whole runs, in no view."""
     sets = weighed(study)
-    vars(sets)["weighed"] = [Weighed((), 1.0, 0.9), Weighed(("vortex_shedding",), 0.5, 0.1)]
+    vars(sets)["weighed"] = [Answer((), 1.0, 0.9), Answer(("vortex_shedding",), 0.5, 0.1)]
     assert resolved(sets) is sets
 
 
@@ -136,14 +137,14 @@ def judged(noisy: bool) -> GapTest:
     return GapTest(True, 0.0, {}, noisy=noisy)
 
 
-OPEN = [Weighed(UNKNOWN, 0.0, 0.5), Weighed(("dropped_samples",), 0.3, 0.5)]
+OPEN = [Answer(UNKNOWN, 0.0, 0.5), Answer(("dropped_samples",), 0.3, 0.5)]
 
 
 @pytest.mark.parametrize(("chance", "explains"), [(0.9, False), (1.1, True)])
 def test_a_gap_below_the_scatter_of_the_noise_has_no_shares(chance: float, explains: bool) -> None:
     """Bands may show a gap where the mean square does not; every set would close all of it."""
     left = _left(0.002, 4, chance)
-    assert noise_explains(left, judged(noisy=False), [Weighed(("sensor_drift",), 0.0, 0.9)]) is explains
+    assert noise_explains(left, judged(noisy=False), [Answer(("sensor_drift",), 0.0, 0.9)]) is explains
 
 
 @pytest.mark.parametrize("block", [1, 4])
@@ -155,7 +156,7 @@ def test_noise_that_misbehaves_explains_a_gap_up_to_its_own_power(
 ) -> None:
     left, test = _left(excess, block), judged(noisy)
     assert noise_explains(left, test, OPEN) is explains
-    assert not noise_explains(left, test, [*OPEN, Weighed(("dropped_samples",), 0.02, 0.9)])
+    assert not noise_explains(left, test, [*OPEN, Answer(("dropped_samples",), 0.02, 0.9)])
 
 
 @pytest.mark.parametrize(("share", "alone"), [(0.5, True), (20.0, False)])
@@ -197,7 +198,7 @@ def test_the_random_moment_of_a_free_body_is_that_of_the_likeliest_set_that_leav
     nominal = SimpleNamespace(problem=SimpleNamespace(data=data), point=None)
     prepared = SimpleNamespace(nominal=nominal, settings=Settings())
     sets = {(name,): SimpleNamespace(fit=name) for name in powers}
-    weighed = [Weighed((name,), 0.1, 0.01) for name in dict.fromkeys((first, "a", "b"))]
+    weighed = [Answer((name,), 0.1, 0.01) for name in dict.fromkeys((first, "a", "b"))]
     weighed = weighed if first == "unknown" else [replace(one, probability=0.3) for one in weighed]
     best = SimpleNamespace(fit=SimpleNamespace(chance=0.01))
     known = SimpleNamespace(

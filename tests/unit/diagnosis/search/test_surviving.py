@@ -17,7 +17,7 @@ from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.process_noise import MomentLayer, ProcessNoise
 from diagnosis.search.sets import Sets, resolved
 from diagnosis.search.surviving import contradicted, explains_too_much, refusal, shown_by_one
-from diagnosis.search.weigh import FittedSet
+from diagnosis.search.weights import FittedSet
 from tests.support.gap_campaigns import campaign, nominal, whole_runs
 from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.vocabulary.campaign import Campaign

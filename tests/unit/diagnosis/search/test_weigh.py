@@ -6,7 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit
-from diagnosis.search.weigh import UNKNOWN, FittedSet, log_weight, misfit_scale, weigh
+from diagnosis.search.answer import UNKNOWN
+from diagnosis.search.weigh import weigh
+from diagnosis.search.weights import FittedSet, log_weight, misfit_scale
 from diagnosis.settings import Settings
 
 NAMES = ("a", "b", "c", "d", "e")

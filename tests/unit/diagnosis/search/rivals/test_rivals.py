@@ -11,11 +11,13 @@ from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import misfit
 from diagnosis.model.fact import as_stated
+from diagnosis.search.answer import UNKNOWN
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import investigate
 from diagnosis.search.rivals.rival import Rival
 from diagnosis.search.rivals.two_springs import AnotherSpring, TwoSprings
-from diagnosis.search.weigh import UNKNOWN, FittedSet, weigh
+from diagnosis.search.weigh import weigh
+from diagnosis.search.weights import FittedSet
 from diagnosis.settings import Settings
 from tests.support.gap_campaigns import campaign, nominal
 from tunnel_reference.draw import Mixture, draw_campaign
