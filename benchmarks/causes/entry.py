@@ -41,12 +41,14 @@ class About:
         setting: the documented setting, in a sentence.
         names: causes that it can name, including `unknown` where applicable.
         not_seen: tracks that it cannot process, marked "–" in the table.
+        program: address of its program, for the page; empty: not stated.
     """
 
     title: str
     setting: str
     names: Sequence[str] = (*NAMES, UNKNOWN)
     not_seen: Sequence[str] = ()
+    program: str = ""
 
 
 def answer_of(

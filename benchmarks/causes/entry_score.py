@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.causes.entry import NAMES, UNKNOWN, About
-from benchmarks.causes.make import SEAL, truths_by_track
+from benchmarks.causes.make import SEAL, differing, is_edition, published, truths_by_track
 from diagnosis.answer.run_deviations import Spread
 from diagnosis.findings.decision import decision
 from diagnosis.findings.terms import SCATTERS
@@ -27,7 +27,6 @@ from tunnel_lab.experiments.blind.cases import NAMES as COEFFICIENTS
 from tunnel_lab.experiments.blind.cases import Case, ScoredAnswer, case, found_by_group, inclusions
 from tunnel_lab.experiments.blind.scatter_score import scatter_score
 from tunnel_lab.experiments.blind.set_score import calibration, smooth_calibration
-from tunnel_sim.files.reading import as_described
 from tunnel_sim.files.writing import as_json
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -36,42 +35,6 @@ FLOOR = 0.01
 "few trials."""
 WITHIN = 2.0  # standard deviations of a coefficient
 _SETS = 60  # most listed sets of independent causes; the remaining probability is in no credible set
-
-
-def read_answers(folder: Path) -> dict[str, dict[str, Any]]:
-    """The answers of a folder by campaign.
-
-    Args:
-        folder: of one JSON file for each campaign.
-
-    Raises:
-        TunnelError: when there are no files, or a file is not an answer.
-    """
-    found = {}
-    for path in sorted(folder.glob("*.json")):
-        with as_described("is not an answer", str(path), "see benchmarks/causes/answer.schema.json"):
-            found[path.stem] = json.loads(path.read_text(encoding="utf-8"))
-            _check(found[path.stem])
-    if not found:
-        raise TunnelError(
-            "holds no answer", where=str(folder), remedy="write one JSON file for each campaign"
-        )
-    return found
-
-
-def _check(answer: Mapping[str, Any]) -> None:
-    """Check the rules of the schema that affect a score, without a validator package."""
-    labels = {*NAMES, UNKNOWN, *SCATTERS}
-    named = answer["causes"] or []
-    if not labels >= set(named) or not labels >= set(answer["probability"]):
-        raise ValueError("names a cause outside the vocabulary")
-    if UNKNOWN in named and set(named) - {UNKNOWN, *SCATTERS}:
-        raise ValueError("'unknown' stands alone")
-    values = [*answer["probability"].values(), *(s["probability"] for s in answer.get("sets", ()))]
-    if not all(0.0 <= float(p) <= 1.0 for p in values):
-        raise ValueError("a probability is not between 0 and 1")
-    if sum(s["probability"] for s in answer.get("sets", ())) > 1.0 + 1e-6:
-        raise ValueError("the probabilities of the sets sum to more than 1")
 
 
 def likely_sets(answer: Mapping[str, Any]) -> list[tuple[tuple[str, ...], float]]:
@@ -213,7 +176,8 @@ def score(
     """
     strange = sorted(set(answers) - set(key["truths"]))
     if strange:
-        raise TunnelError(f"the set has no campaign '{strange[0]}'", where=name, remedy="answer this set's")
+        what = f"answers the campaign '{strange[0]}', which is not in the set"
+        raise TunnelError(what, where=name, remedy=f"answer the campaigns of {folder}")
     seal = json.loads((folder / SEAL).read_text(encoding="utf-8"))
     tracks: dict[str, Any] = {}
     every: list[Case] = []
@@ -223,13 +187,16 @@ def score(
             tracks[track] = figures(cases)
         every += cases
     nameable = [n in c.named for c in every for n in c.truth if n in about.names and n != UNKNOWN]
+    made_with = key["made_with"]
     text = json.dumps(answers, sort_keys=True).encode()
     return {
         "schema_version": 1,
-        "version": key["made_with"]["version"],
+        "version": made_with["version"],
+        "differing": differing(seal, published(made_with["version"])) if is_edition(made_with) else None,
         "method": name,
         "title": about.title,
         "setting": about.setting,
+        "program": about.program,
         "names": sorted(about.names),
         "not_seen": sorted(about.not_seen),
         "key_sha256": seal["key_sha256"],

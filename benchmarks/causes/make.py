@@ -21,8 +21,9 @@ import polars as pl
 from benchmarks.causes.tracks import EDITIONS, REAL, VERSION, draw_all
 from tunnel_lab.experiments.blind.sets import file_hash, write_document
 from tunnel_sim.files.reading import read_json
+from tunnel_sim.files.writing import output_folder
 from tunnel_sim.processes import in_processes
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError, counted
 
 SEAL, KEY, CAMPAIGNS = "seal.json", "key/key.json", "campaigns"
 CHUNK = 10  # campaigns simulated together; larger chunks are hardly faster
@@ -41,7 +42,6 @@ def make(
     counts: Mapping[str, int] | None = None,
     jobs: int = 1,
     salt: str | None = None,
-    real: bool | None = None,
 ) -> Path:
     """Make a set; an interrupted one is continued.
 
@@ -53,31 +53,31 @@ def make(
         jobs: number of processes.
         salt: random text in the key, to prevent finding its hash by trial of truths; None: derived from the seed,
             as in the published set, whose key everyone can make.
-        real: whether the set includes the packaged measured records; None: as in the version.
 
     Returns:
         The seal's file.
 
     Raises:
-        TunnelError: when the folder holds a finished set.
+        TunnelError: when the folder holds a finished set, or cannot be written to.
     """
     if (out / SEAL).exists():
         raise TunnelError("holds a finished set", where=str(out), remedy="name another folder")
+    output_folder(out)
     edition = EDITIONS[version]
     seed = edition.seed if seed is None else seed
     counts = edition.counts if counts is None else counts
     drawn = draw_all(seed, counts)
     todo = [(i, seed, dict(counts)) for i in range(0, len(drawn), CHUNK)]
-    (out / ".making").mkdir(parents=True, exist_ok=True)
+    (out / ".making").mkdir(exist_ok=True)
     for (first, *_), number in in_processes(partial(_make_chunk, out), todo, jobs if jobs > 1 else 0):
         print(f"campaigns {first + 1} to {first + number} of {len(drawn)}", flush=True)
     truths: dict[str, Any] = {}
     for first, *_ in todo:
         truths |= read_json(out / ".making" / f"{first}.json", remedy="make the set again")
-    if edition.real if real is None else real:
+    made_with = {"version": version, "seed": seed, "counts": dict(counts)}
+    if edition.real and is_edition(made_with):  # not in sets of other seeds, on which methods are trained
         truths |= _copy_records(out / CAMPAIGNS)
     salt = hashlib.sha256(f"causes v{version} {seed}".encode()).hexdigest() if salt is None else salt
-    made_with = {"version": version, "seed": seed, "counts": dict(counts)}
     (out / KEY).parent.mkdir(exist_ok=True)
     key = write_document(
         out / KEY, {"schema_version": 1, "salt": salt, "made_with": made_with, "truths": truths}
@@ -86,6 +86,16 @@ def make(
     write_document(out / SEAL, {"schema_version": 1, "key_sha256": key, "campaigns_sha256": hashes})
     shutil.rmtree(out / ".making")
     return out / SEAL
+
+
+def is_edition(made_with: Mapping[str, Any]) -> bool:
+    """Whether a set is one of ``EDITIONS``, and not of another seed or with other numbers of campaigns.
+
+    Args:
+        made_with: from the key of the set.
+    """
+    edition = EDITIONS[made_with["version"]]
+    return made_with["seed"] == edition.seed and made_with["counts"] == edition.counts
 
 
 def _make_chunk(out: Path, task: tuple[int, int, dict[str, int]]) -> int:
@@ -157,8 +167,13 @@ def check(folder: Path, published: Path | None = None) -> dict[str, Any]:
         TunnelError: when a campaign or the key does not match the seal.
     """
     seal = read_json(folder / SEAL, remedy="make the set first: python -m benchmarks.causes make")
-    if published is not None and (other := differs(seal, published)):
-        raise TunnelError("is not the published set", where=str(folder), remedy=other)
+    if published is not None and (names := differing(seal, published)):
+        number = f"{counted(len(names), 'campaign')} of {len(seal['campaigns_sha256'])}"
+        what = f"{number} differ from the published set ({', '.join(names[:3])})"
+        remedy = (
+            "another processor or NumPy rounds otherwise: score them, and the result names these campaigns"
+        )
+        raise TunnelError(what, where=str(folder), remedy=remedy)
     for name, known in seal["campaigns_sha256"].items():
         if data_hash(folder / CAMPAIGNS / name) != known:
             raise TunnelError("is not the campaign that was sealed", where=name, remedy="make the set again")
@@ -167,13 +182,15 @@ def check(folder: Path, published: Path | None = None) -> dict[str, Any]:
     return read_json(folder / KEY, remedy="restore it")
 
 
-def differs(seal: Mapping[str, Any], published: Path) -> str:
-    """Differences of a seal's campaigns from the published ones, in words; empty: none."""
+def differing(seal: Mapping[str, Any], published: Path) -> list[str]:
+    """Names of the campaigns whose hashes differ from the published ones.
+
+    Args:
+        seal: of a set.
+        published: the seal's file of a version.
+    """
     other, own = read_json(published, remedy="restore it")["campaigns_sha256"], seal["campaigns_sha256"]
-    names = sorted(name for name in {**other, **own} if other.get(name) != own.get(name))
-    if not names:
-        return ""
-    return f"{len(names)} campaigns differ ({', '.join(names[:3])}); another version of NumPy may round otherwise"
+    return sorted(name for name in {**other, **own} if other.get(name) != own.get(name))
 
 
 def truths_by_track(key: Mapping[str, Any]) -> dict[str, list[str]]:

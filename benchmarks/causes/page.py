@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from datetime import date
 from pathlib import Path
 from typing import Any
 
 from benchmarks.causes.entry import NAMES
+from benchmarks.causes.make import published
+from benchmarks.causes.methods import METHODS
 from benchmarks.causes.tracks import EDITIONS, REAL, SEED, TRACKS, VERSION
+from docs.studies.page_text import as_stamped
+from tunnel_sim.files.reading import read_json
+from tunnel_sim.vocabulary.errors import TunnelError, counted, shown
 
 ROOT = Path(__file__).parents[2]
 RESULTS = Path(__file__).parent / "results"
@@ -25,13 +29,24 @@ def results_of(version: int) -> Path:
     return RESULTS if version == VERSION else RESULTS / f"v{version}"
 
 
-def read_results(folder: Path = RESULTS) -> list[dict[str, Any]]:
+def read_results(folder: Path = RESULTS, version: int = VERSION) -> list[dict[str, Any]]:
     """The results, in decreasing order of the share of exact sets.
 
     Args:
         folder: of one file for each method.
+        version: of the set.
+
+    Raises:
+        TunnelError: when a file is not a result, or is of another set.
     """
-    found = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(folder.glob("*.json"))]
+    found = []
+    for path in sorted(folder.glob("*.json")):
+        r = read_json(path, remedy="score the answers again")
+        if r.get("version") != version or r.get("differing", []) is None:
+            what = f"is not a result on the published set, version {version}"
+            remedy = f"score answers to the set that 'make --version {version}' makes"
+            raise TunnelError(what, where=shown(path), remedy=remedy)
+        found.append(r)
     return sorted(found, key=lambda r: -_share(r["all"]["exact"]))
 
 
@@ -51,9 +66,12 @@ def write_page(results: Path = RESULTS, page: Path = PAGE, figure: Path = FIGURE
         The page's file.
     """
     found = read_results(results)
-    scattering = read_results(results / f"v{_SCATTERING}")
+    scattering = read_results(results / f"v{_SCATTERING}", _SCATTERING)
     _draw(found, figure)
-    page.write_text(page_text(found, f"images/{figure.name}", scattering), encoding="utf-8")
+    text = page_text(found, f"images/{figure.name}", scattering)
+    page.write_text(
+        text if not page.exists() else as_stamped(text, page.read_text("utf-8")), encoding="utf-8"
+    )
     return page
 
 
@@ -105,6 +123,7 @@ def page_text(
         "chosen with knowledge of the truths of the first 40 campaigns; no other setting was tuned on the set, "
         "unless its row says so.\n",
         *[_about(r, found) for r in found],
+        *[_about(r, scattering) for r in scattering if r["method"] not in {one["method"] for one in found}],
     ]
     return "\n".join(parts).rstrip() + "\n"
 
@@ -204,11 +223,13 @@ def _scatter_table(found: Sequence[Mapping[str, Any]]) -> list[str]:
         "method", "all", *(t.replace("_", " ") for t in edition.tracks), "scatter named, nothing else",
         "as stated: nothing named", "named where runs repeat",
     )  # fmt: skip
+    others = "".join(map(_other_set, found))
     return [
         "\n## Runs that do not repeat exactly\n",
         f"Version {_SCATTERING} of the set (seed {edition.seed}) has {sum(edition.counts.values())} campaigns. In "
         "most of them wind speed, springs or damping differ from run to run by chance. Sets are exact whether "
         f"scatter is named or not; how it is named stands beside them. The answers were scored {_scored(found)}."
+        + others
         + ("" if OURS in [r["method"] for r in found] else " `tunnel diagnose` has not been run on it yet.")
         + "\n",
         _table(heads, rows),
@@ -253,14 +274,34 @@ def _about(r: Mapping[str, Any], found: Sequence[Mapping[str, Any]]) -> str:
         f" On the {len(both)} campaigns that both answered it has {_right(r, both)} exact sets, and "
         f"`tunnel diagnose` {_right(ours, both)}."
     )  # fmt: skip
+    same += _other_set(r)
+    program = f"../benchmarks/causes/methods/{r['method']}.py" if r["method"] in METHODS else r["program"]
+    folder = results_of(r["version"]).relative_to(RESULTS.parent).as_posix()
+    result = f"../benchmarks/causes/{folder}/{r['method']}.json"
+    links = ", ".join([*([f"[program]({program})"] if program else []), f"[result]({result})"])
     every = len(NAMES) + 1  # and `unknown`
     can = f" It can name {len(r['names'])} of {every} answers." if len(r["names"]) < every else ""
     return (
-        f"- **{r['title']}** ([program](../benchmarks/causes/methods/{r['method']}.py), "
-        f"[result](../benchmarks/causes/results/{r['method']}.json)): {r['setting']}.{can}{same} Processor "
+        f"- **{r['title']}** ({links}): {r['setting']}.{can}{same} Processor "
         f"time of all answers: "
         f"{r['all']['seconds']['sum'] / 3600:.2f} h. No answer: {r['all']['no_answer']}. Answers sha256 "
         f"`{r['answers_sha256'][:16]}…`, key `{r['key_sha256'][:16]}…`."
+    )
+
+
+def _other_set(r: Mapping[str, Any]) -> str:
+    """The difference of a result's set from the published one, as a sentence; empty where none is known."""
+    known = read_json(published(r["version"]), remedy="restore it")["key_sha256"]
+    differing = r.get("differing")  # results of earlier days do not record it
+    if differing:
+        number = counted(len(differing), "campaign")
+        return f" In the set of {r['title']}, {number} differed from the published ones."
+    if r["key_sha256"] == known:
+        return ""
+    campaigns = "it is not recorded whether" if differing is None else "none of"
+    return (
+        f" The key of {r['title']}, `{r['key_sha256'][:16]}…`, is not the published one, `{known[:16]}…`; "
+        f"{campaigns} its campaigns differed."
     )
 
 

@@ -33,6 +33,15 @@ def stamped(page: str, name: str, day: date, minutes: float) -> str:
     return f"{title}\n\n{line}{rest}"
 
 
+def as_stamped(page: str, earlier: str) -> str:
+    """A page with the day and the command that its earlier version states; unchanged where that states none."""
+    found = _MADE.search(earlier)
+    if not found:
+        return page
+    title, rest = page.split("\n", 1)
+    return f"{title}\n\n{found[0]}{rest}"
+
+
 def table_in(printed: str) -> str:
     """The lines of the table that a command prints, without the others."""
     return "\n".join(line for line in printed.splitlines() if line.startswith("|"))

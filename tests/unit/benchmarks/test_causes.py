@@ -15,10 +15,11 @@ import pytest
 
 from benchmarks.causes import make as making
 from benchmarks.causes.__main__ import main
+from benchmarks.causes.answer_file import read_answers
 from benchmarks.causes.entry import NAMES, About, answer_all, answer_of, schema
-from benchmarks.causes.entry_score import figures, likely_sets, read_answers, score
+from benchmarks.causes.entry_score import figures, likely_sets, score
 from benchmarks.causes.make import CAMPAIGNS, KEY, check, data_hash, make
-from benchmarks.causes.page import page_text
+from benchmarks.causes.page import page_text, read_results
 from benchmarks.causes.tracks import EDITIONS, TRACKS, draw_all
 from tests.marks import slow
 from tests.reference.rigs import short_campaigns
@@ -31,7 +32,7 @@ DRAWN = {1: "43527d67c87f6eb0", 2: "b06dd1b2966296ca"}
 
 def made(folder, **more):
     with short_campaigns(sample_rate=500.0):
-        make(folder, seed=3, counts=COUNTS, real=False, **more)
+        make(folder, seed=3, counts=COUNTS, **more)
     return folder
 
 
@@ -184,7 +185,7 @@ def test_a_perfect_entry_has_perfect_scores(small):
     assert found["all"]["log_score"] == pytest.approx(25 * np.log(0.99))
 
 
-def test_wrong_missing_and_impossible_answers(small, tmp_path):
+def test_wrong_and_missing_answers(small):
     answers = perfect(small)
     first = sorted(answers)[0]
     answers[first] = {"campaign": first, "causes": None, "probability": {}}
@@ -196,17 +197,177 @@ def test_wrong_missing_and_impossible_answers(small, tmp_path):
     )
     assert partial["answered"] == 1
     assert "none" not in partial["tracks"]
-    for bad in (
-        {"causes": ["elephant"], "probability": {}},
-        {"causes": ["unknown", "mains_hum"], "probability": {}},
-        {"causes": [], "probability": {"mains_hum": 1.5}},
-        {"causes": [], "probability": {}, "sets": [{"causes": [], "probability": 0.7}] * 2},
-    ):
-        (tmp_path / "c0001.json").write_text(json.dumps(bad))
-        with pytest.raises(TunnelError, match="is not an answer"):
-            read_answers(tmp_path)
-    with pytest.raises(TunnelError, match="no campaign 'nowhere'"):
+    with pytest.raises(TunnelError, match="'nowhere', which is not in the set"):
         score(small, check(small), {"nowhere": answers[first]}, "", About("", ""))
+
+
+GOOD = {"schema_version": 1, "campaign": "c0001", "causes": [], "probability": {"mains_hum": 0.1}}
+WIDTH = {"value": 0.1, "interval_90": [0.0, 0.2], "named": True}
+NAN = float("nan")
+UNLIKE_THE_SCHEMA = (  # what fields allow, and what the message says
+    ({"campaign": "c0002"}, "rename it c0002.json"),
+    ({"sets": [{"causes": [], "probability": 0.7}, {"causes": ["mains_hum"], "probability": 0.7}]}, "sum to 1.4"),
+    ({"sets": [{"causes": ["mains_hum", "free_play"], "probability": 0.3}, {"causes": ["free_play", "mains_hum"],
+      "probability": 0.3}]}, "more than once"),
+    ({"causes": ["unknown", "mains_hum"]}, "'unknown' beside a cause"),
+    ({"sets": [{"causes": ["unknown", "mains_hum"], "probability": 0.3}]}, "sets.0.causes"),
+    ({"scatter": {"wind_speed": WIDTH | {"interval_90": [0.2, 0.0]}}}, "lower end first"),
+)  # fmt: skip
+AGAINST_THE_SCHEMA = (
+    ({"schema_version": 2}, "schema_version"),
+    ({"campaign": None}, "campaign"),
+    ({"causes": "mains_hum"}, "causes"),
+    ({"causes": ["coulomb"]}, "did you mean 'coulomb_friction'"),
+    ({"causes": ["none"]}, "give \\[\\] for no gap"),
+    ({"causes": ["mains_hum", "mains_hum"]}, "a cause twice"),
+    ({"probability": {"coulomb": 0.5}}, "probability has 'coulomb'"),
+    ({"probability": [0.5]}, "probability"),
+    ({"probability": {"mains_hum": 1.5}}, "probability.mains_hum"),
+    ({"probability": {"mains_hum": "0.5"}}, "probability.mains_hum"),
+    ({"probability": {"mains_hum": None}}, "probability.mains_hum"),
+    ({"sets": None}, "sets"),
+    ({"sets": [{"causes": ["coulomb"], "probability": 0.3}]}, "sets.0.causes has 'coulomb'"),
+    ({"sets": [{"causes": []}]}, "sets.0.probability"),
+    ({"seconds": -3.0}, "seconds"),
+    ({"seconds": "3 s"}, "seconds"),
+    ({"probabilty": {}}, "probabilty"),
+    ({"coefficients": {"cn_beta": {"value": 0.4, "std": 0.1}}}, "coefficients.cn_beta"),
+    ({"coefficients": {"after": {"cn_beta": {"value": 0.4}}}}, "after.cn_beta.std"),
+    ({"coefficients": {"after": {"cn_beta": {"value": 0.4, "std": 0.0}}}}, "after.cn_beta.std"),
+    ({"scatter": {"wind": WIDTH}}, "scatter.wind"),
+    ({"scatter": {"wind_speed": {"value": 0.1, "named": True}}}, "interval_90"),
+    ({"scatter": {"wind_speed": WIDTH | {"interval_90": [0.0, 0.1, 0.2]}}}, "interval_90"),
+)
+
+
+def test_a_file_that_is_not_an_answer_is_refused_in_one_line(tmp_path):
+    """The published schema refuses the same, but for rules that a schema cannot state."""
+    path = tmp_path / "c0001.json"
+    for bad, message in UNLIKE_THE_SCHEMA + AGAINST_THE_SCHEMA:
+        path.write_text(json.dumps(GOOD | bad))
+        with pytest.raises(TunnelError, match=message) as refused:
+            read_answers(tmp_path)
+        assert refused.value.where == str(path), bad
+        assert refused.value.remedy, bad
+        assert jsonschema.Draft202012Validator(schema()).is_valid(GOOD | bad) == (
+            (bad, message) in UNLIKE_THE_SCHEMA
+        ), bad
+    for name in ("schema_version", "campaign", "causes", "probability"):
+        path.write_text(json.dumps({key: value for key, value in GOOD.items() if key != name}))
+        with pytest.raises(TunnelError, match=f"{name}: Field required"):
+            read_answers(tmp_path)
+    for text in (
+        "",
+        '{"a":',
+        "[1]",
+        json.dumps(GOOD | {"seconds": NAN}),
+        json.dumps(GOOD | {"probability": {"mains_hum": NAN}}),
+    ):
+        path.write_text(text)
+        with pytest.raises(TunnelError, match=r"is not (JSON|a JSON object)"):
+            read_answers(tmp_path)
+    full = GOOD | {
+        "scatter": {"wind_speed": WIDTH},
+        "causes": ["unknown", "wind_speed_scatter"],
+        "seconds": 1,
+    }
+    path.write_text(json.dumps(full))
+    assert read_answers(tmp_path) == {"c0001": full}
+    jsonschema.validate(full, schema())
+
+
+def test_the_command_states_the_set_and_the_unanswered_and_refuses_with_status_2(small, tmp_path, capsys):
+    answers = tmp_path / "mine"
+    answers.mkdir()
+    for name, answer in sorted(perfect(small).items())[1:]:
+        (answers / f"{name}.json").write_text(json.dumps(answer))
+    outs = [tmp_path / name for name in ("a.json", "b.json")]
+    for out in outs:
+        assert (
+            main(["score", str(small), str(answers), "--out", str(out), "--program", "https://example.org"])
+            == 0
+        )
+    assert outs[0].read_bytes() == outs[1].read_bytes()
+    said = capsys.readouterr().out
+    assert "not a published set" in said
+    assert "Sets exact: 2 of 2 (95 %: 34 to 100 %)" in said
+    assert "Not answered, not scored: 1 campaign (c0001)" in said
+    assert json.loads(outs[0].read_text())["program"] == "https://example.org"
+    (answers / "c0002.json").write_text("{}")
+    assert main(["score", str(small), str(answers), "--out", str(tmp_path / "c.json")]) == 2
+    assert not (tmp_path / "c.json").exists()
+    assert len(capsys.readouterr().err.splitlines()) == 1
+    file = tmp_path / "file"
+    file.write_text("")
+    for bad, message in (
+        (["make", str(file), "--seed", "7"], "file"),
+        (["make", "--seed", "7"], "name another"),
+        (["make", str(tmp_path / "set"), "--tracks", "one=2"], "needs another seed"),
+        (["make", str(tmp_path / "set"), "--seed", "7", "--tracks", "on=2"], "did you mean 'one'"),
+        (["run", "lisdd", str(tmp_path / "nowhere")], "make the set first"),
+        (
+            ["score", str(small), str(answers), "--out", str(tmp_path / "no" / "x.json")],
+            "its folder does not exist",
+        ),
+    ):
+        assert main(bad) == 2
+        assert message in capsys.readouterr().err
+    assert not (tmp_path / "set").exists()
+    for bad in (
+        ["make", "--seed", "-3"],
+        ["make", "x", "--seed", "7", "--tracks", "one"],
+        ["run", "lisdd", "--first", "0"],
+    ):
+        with pytest.raises(SystemExit) as ended:
+            main(bad)
+        assert ended.value.code == 2
+
+
+def test_a_set_of_another_seed_is_not_for_the_page(small, tmp_path, monkeypatch):
+    monkeypatch.setattr("benchmarks.causes.__main__.results_of", lambda _version: 1 / 0)
+    folder = Path(shutil.copytree(small, tmp_path / "set"))
+    assert main(["run", "always_unknown", str(folder)]) == 0
+    written = json.loads((folder / "results" / "always_unknown.json").read_text())
+    assert written["differing"] is None
+    with pytest.raises(TunnelError, match="not a result on the published set, version 1"):
+        read_results(folder / "results")
+
+
+def test_a_result_states_the_campaigns_that_differ_from_the_published_ones(small, tmp_path, monkeypatch):
+    """Truth: the seal of the set itself is taken as the published one, with one hash changed."""
+    seal = json.loads((small / "seal.json").read_text())
+    first = sorted(seal["campaigns_sha256"])[0]
+    monkeypatch.setattr("benchmarks.causes.entry_score.is_edition", lambda _made_with: True)
+    monkeypatch.setattr("benchmarks.causes.entry_score.published", lambda _version: tmp_path / "seal.json")
+    for changed in ({}, {first: "0"}):
+        document = seal | {"campaigns_sha256": seal["campaigns_sha256"] | changed}
+        (tmp_path / "seal.json").write_text(json.dumps(document))
+        result = score(
+            small, check(small), perfect(small), "ours", About("mine", "", program="https://example.org")
+        )
+        assert result["differing"] == list(changed)
+        text = page_text([result], "")
+        assert ("1 campaign differed" in text) == bool(changed)
+        assert ("none of its campaigns differed" in text) != bool(changed)
+
+
+def test_a_row_of_the_second_version_alone_is_described_with_its_program(small):
+    result = score(
+        small,
+        check(small),
+        perfect(small),
+        "mine",
+        About("mine", "its settings", program="https://example.org"),
+    )
+    ours = result | {"method": "ours", "title": "ours"}
+    text = page_text([ours], "", [result | {"version": 2}])
+    results = "../benchmarks/causes/results"
+    assert (
+        f"**mine** ([program](https://example.org), [result]({results}/v2/mine.json)): its settings." in text
+    )
+    assert (
+        f"**ours** ([program](../benchmarks/causes/methods/ours.py), [result]({results}/ours.json))" in text
+    )
 
 
 def test_independent_causes_make_sets():
@@ -244,10 +405,14 @@ def test_coefficients_count_within_two_standard_deviations(small):
     assert found["cn_beta after"]["median_relative_error"] == pytest.approx(0.01)
 
 
-@pytest.mark.parametrize("command", [[sys.executable, "entry.py"], slow(["sh", "entry.sh"])])
+@pytest.mark.parametrize(
+    "command", [[sys.executable, "entry.py"], [sys.executable, "learned.py"], slow(["sh", "entry.sh"])]
+)
 def test_the_examples_write_valid_answers(small, tmp_path, command):
+    training = [str(small)] if command[1] == "learned.py" else []
     subprocess.run(
-        [command[0], str(EXAMPLES / command[1]), str(small / CAMPAIGNS), str(tmp_path / "a")], check=True
+        [command[0], str(EXAMPLES / command[1]), *training, str(small / CAMPAIGNS), str(tmp_path / "a")],
+        check=True,
     )
     found = read_answers(tmp_path / "a")
     assert set(found) == set(check(small)["truths"])
