@@ -18,7 +18,7 @@ from benchmarks.causes.__main__ import main
 from benchmarks.causes.answer_file import read_answers
 from benchmarks.causes.entry import NAMES, About, answer_all, answer_of, schema
 from benchmarks.causes.entry_score import figures, likely_sets, score
-from benchmarks.causes.make import CAMPAIGNS, KEY, check, data_hash, make
+from benchmarks.causes.make import CAMPAIGNS, KEY, check, data_hash, is_edition, make
 from benchmarks.causes.page import page_text, read_results
 from benchmarks.causes.tracks import EDITIONS, TRACKS, draw_all
 from tests.marks import slow
@@ -331,6 +331,14 @@ def test_a_set_of_another_seed_is_not_for_the_page(small, tmp_path, monkeypatch)
     assert written["differing"] is None
     with pytest.raises(TunnelError, match="not a result on the published set, version 1"):
         read_results(folder / "results")
+
+
+@pytest.mark.parametrize("version", EDITIONS)
+def test_a_published_set_is_of_the_seed_and_the_counts_of_its_version(version):
+    made_with = {"version": version, "seed": EDITIONS[version].seed, "counts": dict(EDITIONS[version].counts)}
+    assert is_edition(json.loads(json.dumps(made_with)))
+    assert not is_edition(made_with | {"seed": 7})
+    assert not is_edition(made_with | {"counts": {"one": 2}})
 
 
 def test_a_result_states_the_campaigns_that_differ_from_the_published_ones(small, tmp_path, monkeypatch):
