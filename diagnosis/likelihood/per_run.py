@@ -10,7 +10,7 @@ import numpy as np
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.mains_lines import mains_line
 from diagnosis.likelihood.residuals import SpectralLine, linear_coefficients, resonance, wind_line
-from tunnel_sim.effects.base import MULTIPLES, NEAR_MOTION, REFERENCE_RELEASE
+from tunnel_sim.effects.base import HARMONICS, NEAR_MOTION, REFERENCE_RELEASE, beats_with
 from tunnel_sim.effects.evidence import Sought
 from tunnel_sim.vocabulary.record import Array
 
@@ -67,8 +67,8 @@ def ringing(fit: Fit) -> Sought | None:
         Amplitude (rad), angular frequency (rad/s) and damping ratio with every run's phase; None where no
         frequency is distinct from the motion.
 
-    A run does not count where the frequency is its own motion's, or a multiple of it. At least half of the
-    runs must count: springs and winds differ, so a line near the motion of one run is distinct in another.
+    A run does not count where the frequency does not beat with its own motion, or is a multiple of it. At least
+    half of the runs must count: springs and winds differ, so a line at the motion of one run is apart in another.
     """
     runs = fit.problem.data.runs
     step = 1.0 / (_RINGING_PADDING * max(run.duration for run in runs))
@@ -76,9 +76,11 @@ def ringing(fit: Fit) -> Sought | None:
     apart = []  # by run, where the grid is neither the run's own frequency nor a multiple of it
     for run in runs:
         padded = _RINGING_PADDING * run.reading.size
-        swing = (run.reading - run.reading.mean()) * np.hanning(run.reading.size)
+        # the start counts most: a second mode may outlast the motion
+        swing = (run.reading - run.reading.mean()) * np.hanning(2 * run.reading.size)[run.reading.size :]
         own = float(np.argmax(np.abs(np.fft.rfft(swing, padded)))) / (padded * run.interval)
-        apart.append(np.all([np.abs(grid - k * own) > NEAR_MOTION * own for k in MULTIPLES], axis=0))
+        harmonic = np.any([np.abs(grid - k * own) <= NEAR_MOTION * own for k in HARMONICS], axis=0)
+        apart.append(beats_with(grid, own, run.duration) & ~harmonic)
     beside = np.array(apart)
     free = np.mean(beside, axis=0) >= MODE_RUNS
     if not free.any():
@@ -108,6 +110,38 @@ def ringing(fit: Fit) -> Sought | None:
     mean = float(np.sqrt(np.mean(np.abs(found[beside[:, at]]) ** 2)))
     return Sought((mean, omega, float(rate) / omega), np.angle(found), float(drops[best][at]))
 
+
+def floor_beside(fit: Fit, line: Sought) -> tuple[float, float]:
+    """The power of the residuals at frequencies next to a ringing, without it.
+
+    A mode that the release excites stands on the floor of the noise. Noise with a resonance is as strong next to its
+    strongest line.
+
+    Args:
+        line: from `ringing`.
+
+    Returns:
+        The mean over the runs on the side away from the motion, in noise variances, and its degrees of freedom.
+    """
+    _, omega, damping = line.values
+    frequency, powers = omega / (2.0 * np.pi), list[Array]()
+    for number, (run, residual) in enumerate(zip(fit.problem.data.runs, fit.residuals, strict=True)):
+        time_s = run.interval * np.arange(residual.size)
+        waves = np.exp(-damping * omega * time_s) * np.exp(1j * omega * time_s)
+        basis = np.stack([waves.real, waves.imag], axis=1)
+        rest = residual - basis @ np.linalg.lstsq(basis, residual, rcond=None)[0]
+        bins = np.fft.rfftfreq(residual.size, run.interval)
+        away = np.sign(frequency - resonance(fit, number)) * (bins - frequency) * run.duration
+        power = np.abs(np.fft.rfft(rest)) ** 2 / residual.size
+        powers.append(power[(away >= 1.0) & (away <= _FLOOR_BINS + _FLOOR_SHARE * frequency * run.duration)])
+    whole = np.concatenate(powers)
+    return (float(np.mean(whole)), 2.0 * whole.size) if whole.size else (1.0, np.inf)
+
+
+_FLOOR_BINS, _FLOOR_SHARE = (
+    4.0,
+    0.05,
+)  # width of the band: cycles in a run, and a share of the line's frequency
 
 _DAMPINGS = (0.003, 0.01, 0.03, 0.1)  # of a mode that the input excites
 _APART = 0.02  # frequencies tried, relative: within the half-power width of the dampings, or near it

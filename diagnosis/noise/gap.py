@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from scipy.special import bdtrc, chdtrc, stdtr
+from scipy.special import bdtrc, chdtrc, fdtrc, stdtr
 
 from diagnosis.likelihood.least_squares import Fit, FitError, try_fit
 from diagnosis.likelihood.least_squares import fit as refit
-from diagnosis.likelihood.per_run import excited
+from diagnosis.likelihood.per_run import excited, floor_beside, ringing
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.scatter_widths import width_prior
 from diagnosis.likelihood.starting_points import misses_motion, nominal_start, starting_points
@@ -219,27 +219,27 @@ class _Candidate:
         Where the whitened fit still has a gap, the colour must appear in runs with the wind off, and above the
         motion's harmonics: turbulence needs the wind, and a gap raises the spectrum beside the motion. The noise
         may not exceed its stated level. Where no gap remains, it must not be the spectrum of a wandering zero, of
-        an error that every run repeats or of an oscillation that the input excites.
+        an error that every run repeats or of an oscillation that the release or the input excites.
         """
         chosen = self.nominal.settings
         if test.detected:
             still = bool(self.nominal.problem.data.in_still_air)
             excessive = test.tests.get("noise level", 1.0) < _misbehaves(test.tests, chosen.gap)
             return still and not excessive and noise_colour(self.source, beyond=COLOUR_BEYOND) is not None
-        repeats = alike_in_all_runs(self.nominal) or _follows_input(self.fit)
+        repeats = alike_in_all_runs(self.nominal) or _rings(self.fit)
         return not repeats and not zero_wanders(self.nominal, self.noise.spectrum)
 
 
 def _candidates(nominal: Fit, noise: Noise) -> Iterator[_Candidate]:
     """The possible colours of the noise; none where the nominal model misses the motion.
 
-    The first comes from all runs. The input excites a narrow line, and colour is sought beside it. Turbulence may
-    hide the colour, which is then sought in the runs with the wind off alone.
+    The first comes from all runs. The release or the input may excite a narrow line, and colour is sought beside
+    it. Turbulence may hide the colour, which is then sought in the runs with the wind off alone.
     """
     if misses_motion(nominal):
         return
     found = _Candidate.of(nominal, nominal, noise)
-    if found is not None and _follows_input(found.fit):
+    if found is not None and _rings(found.fit):
         beside = _beside_mode(nominal)
         found = None if beside is None else _Candidate.of(nominal, beside, noise)
     if found is not None:
@@ -259,21 +259,25 @@ def _in_still_air(nominal: Fit) -> Iterator[Fit]:
             yield refit(Problem(only), nominal_start(only))
 
 
-_TRIED = 2000  # frequencies and dampings of an oscillation, at most
+_TRIED = 20_000  # frequencies and dampings of an oscillation, at most
 
 
-def _follows_input(white: Fit) -> bool:
-    """Whether white residuals contain an oscillation that the input excites alike in all runs, unlike noise."""
-    found = excited(white)
-    rate = white.settings.noise.oscillation_rate
-    return found is not None and bool(_TRIED * chdtrc(1.0, found.drop) < rate)
+def _rings(white: Fit) -> bool:
+    """Whether white residuals contain an oscillation that the release or the input excites, unlike noise."""
+    rate, phases = white.settings.noise.oscillation_rate, 2.0 * len(white.residuals)
+    follows, rings = excited(white), ringing(white)
+    if follows is not None and _TRIED * chdtrc(1.0, follows.drop) < rate:
+        return True
+    if rings is None:
+        return False
+    floor, freedom = floor_beside(white, rings)
+    return bool(_TRIED * fdtrc(phases, freedom, rings.drop / (phases * max(floor, 1.0))) < rate)
 
 
 def _beside_mode(nominal: Fit) -> Fit | None:
-    """The fit with the oscillation that the input excites; None where it fails."""
+    """The fit with the oscillation that the release or the input excites; None where it fails."""
     starts = starting_points(nominal, the_effect(SecondOscillation))
-    driven = [start for start in starts if any(value != 0.0 for _, value in start.problem.fixed)]
-    return try_fit(driven[0].problem, driven[0].point) if driven else None
+    return try_fit(starts[0].problem, starts[0].point) if starts else None
 
 
 def noise_noted(noise: Noise, trend: NoiseTrend, test: GapTest, *, named: bool) -> tuple[Noted, ...]:

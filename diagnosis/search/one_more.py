@@ -12,7 +12,7 @@ from diagnosis.likelihood.residuals import gap_left, misfit
 from diagnosis.likelihood.starting_points import StartingPoint, misses_motion, starting_points
 from diagnosis.search.clock import Progress
 from diagnosis.search.hypothesis import Hypothesis, is_plausible, of_more_weight, own_gain, turned_back
-from diagnosis.search.scatter import likelier, with_likeliest_widths
+from diagnosis.search.scatter import likelier, with_likeliest_widths, with_own_linear_terms
 from diagnosis.search.weights import log_weight, misfit_scale
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.capabilities import SecondOscillation
@@ -40,11 +40,16 @@ def second_mode_alone(nominal: Fit, kinds: Sequence[type[Effect]]) -> Hypothesis
     """The second mode, where the nominal model misses the motion because it has only one mode.
 
     Returns:
-        The fit with the mode added; None where it misses the motion too, or may not be tried.
+        The fit with the mode added; None where it misses the motion too, where a frequency and a damping of every
+        run explain as much, or where it may not be tried.
     """
     modes = [kind for kind in kinds if issubclass(kind, SecondOscillation)]
     found = sets_with_one_more([Hypothesis((), nominal)], modes)
-    return found[0] if found and not misses_motion(found[0].fit) else None
+    if not found or misses_motion(found[0].fit):
+        return None
+    own = with_own_linear_terms(nominal, kinds)
+    one_mode = None if own is None else try_fit(*own)
+    return None if one_mode is not None and one_mode.total < found[0].fit.total else found[0]
 
 
 def same_change(one: Fit, other: Fit, nominal: Fit) -> bool:

@@ -56,7 +56,7 @@ class NoiseSettings:
     )
     wandering_rate: float = rate("the test for a wandering zero")
     repeated_rate: float = rate("the test for noise that repeats from run to run")
-    oscillation_rate: float = rate("the test for an oscillation excited by the input")
+    oscillation_rate: float = rate("the test for an oscillation excited by the release or the input")
 
 
 @dataclass(frozen=True)

@@ -23,8 +23,11 @@ SPRING_TOLERANCE = 1e-6
 NEAR_MOTION = 0.3
 """Distance from the motion's frequency or a multiple within which a line is the motion's own, as a share of it."""
 
-MULTIPLES = (1.0, 2.0, 3.0)
+HARMONICS = (2.0, 3.0)
 """Multiples of the motion's frequency at which its harmonics lie."""
+
+_NEAREST_MODE = 0.04  # of the motion's frequency: judgement; nearer, a nonlinear spring does the same
+_LEAST_BEATS = 0.5  # of two modes while both last: then they have been in phase and opposed; judgement
 
 REFERENCE_RELEASE = 0.35
 """Release at which all forms of a second mode have the same amplitude, rad."""
@@ -133,6 +136,21 @@ class Effect(Traits):
         """Name and parameters as plain JSON values."""
         parameters = {info.name: getattr(self, info.name) for info in self.parameters()}
         return {"name": self.name, "parameters": parameters}
+
+
+def beats_with(frequency: Array | float, motion: Array | float, lasting: Array | float) -> Array:
+    """Whether an oscillation near the motion is another mode: it beats with the motion while it lasts.
+
+    Args:
+        frequency: of the oscillation, Hz.
+        motion: frequency of the motion, Hz.
+        lasting: time for which the oscillation is seen, s.
+
+    Returns:
+        True where it is, in the broadcast shape.
+    """
+    apart = np.abs(np.asarray(frequency) - motion)
+    return np.asarray((apart > _NEAREST_MODE * np.asarray(motion)) & (apart * lasting >= _LEAST_BEATS))
 
 
 def make_effect(kind: type[Effect], parameters: Mapping[str, float]) -> Effect:

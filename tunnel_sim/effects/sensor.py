@@ -10,7 +10,7 @@ from typing import Self
 
 import numpy as np
 
-from tunnel_sim.effects.base import NEAR_MOTION, REFERENCE_RELEASE, Drawn
+from tunnel_sim.effects.base import REFERENCE_RELEASE, Drawn, beats_with
 from tunnel_sim.effects.capabilities import (
     Clock,
     CoarseSteps,
@@ -403,11 +403,13 @@ class SecondMode(SecondOscillation):
     def plausible(self, omega: float, duration: float) -> bool:
         """Whether it is a separate oscillation, of three cycles in the record.
 
-        It decays, but not within three cycles, is not the motion's, and not as slow as a drift.
+        It decays, but not within three cycles, beats with the motion, and is not as slow as a drift.
         """
         decays = self.damping_ratio > _DECAYS * _LEAST_DAMPING
         lasts = 2.0 * np.pi * self.damping_ratio * _LEAST_CYCLES < 1.0
-        apart = self.frequency > _SLOWEST * omega and abs(self.frequency / omega - 1.0) > NEAR_MOTION
+        lasting = min(duration, 1.0 / max(self.damping_ratio * self.frequency, 1e-300))
+        beats = bool(beats_with(self.frequency / (2.0 * np.pi), omega / (2.0 * np.pi), lasting))
+        apart = self.frequency > _SLOWEST * omega and beats
         shown = self.frequency * duration >= 2.0 * np.pi * _LEAST_CYCLES
         return decays and lasts and apart and shown
 

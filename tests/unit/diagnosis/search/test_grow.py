@@ -234,9 +234,30 @@ def test_an_effect_taken_out_leaves_the_fit_without_it():
 
 
 def test_a_second_mode_is_neither_a_drift_nor_the_motion_itself() -> None:
-    rates = (0.6, 6.0, 12.0, 14.0, 36.0)
+    rates = (0.6, 6.0, 12.0, 12.3, 14.0, 36.0)
     modes = [effect_from("second_mode", {"amplitude": 0.002, "frequency": rate}) for rate in rates]
-    assert [mode.plausible(12.0, 60.0) for mode in modes] == [False, True, False, False, True]
+    assert [mode.plausible(12.0, 60.0) for mode in modes] == [False, True, False, False, True, True]
+
+
+@pytest.mark.parametrize(
+    ("duration", "damping", "named"), [(2.0, 0.001, True), (1.6, 0.001, False), (2.0, 0.05, False)]
+)
+def test_a_mode_near_the_motion_beats_with_it_while_both_last(duration, damping, named) -> None:
+    """At 1.8 and 2.1 Hz half a beat takes 1.67 s; a mode of 5 % at 2.1 Hz lasts 1.5 s."""
+    mode = effect_from(
+        "second_mode", {"amplitude": 0.002, "frequency": 2.0 * np.pi * 2.1, "damping_ratio": damping}
+    )
+    assert mode.plausible(2.0 * np.pi * 1.8, duration) == named
+
+
+def test_a_mode_near_the_motion_of_every_run_is_found() -> None:
+    base = nominal(campaign())
+    motions = [2.0 * np.pi * resonance(base, i) for i in range(len(base.problem.data.runs))]
+    near = 1.12 * float(np.median(motions))
+    line = effect_from("second_mode", {"amplitude": 0.004, "frequency": near, "damping_ratio": 0.004})
+    (found,) = grow(whole_runs(nominal(campaign(line)), [effect_class("second_mode")]))
+    assert within_noise(found.fit)
+    assert abs(found.fit.value("second_mode.frequency") - near) < 4.0 * found.fit.std("second_mode.frequency")
 
 
 def test_a_second_mode_near_the_motion_of_one_spring_is_found_beside_that_of_the_others() -> None:
