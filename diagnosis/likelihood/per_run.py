@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from scipy.special import fdtrc
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.mains_lines import mains_line
@@ -111,31 +112,35 @@ def ringing(fit: Fit) -> Sought | None:
     return Sought((mean, omega, float(rate) / omega), np.angle(found), float(drops[best][at]))
 
 
-def floor_beside(fit: Fit, line: Sought) -> tuple[float, float]:
-    """The power of the residuals at frequencies next to a ringing, without it.
+def by_chance(fit: Fit, line: Sought) -> float:
+    """P-value of a ringing at its frequency, on the floor of the noise next to it.
 
-    A mode that the release excites stands on the floor of the noise. Noise with a resonance is as strong next to its
-    strongest line.
+    A mode that the release excites stands on the floor, in still air too. Noise with a resonance is as strong next
+    to its strongest line, and vortices need the wind.
 
     Args:
         line: from `ringing`.
-
-    Returns:
-        The mean over the runs on the side away from the motion, in noise variances, and its degrees of freedom.
     """
     _, omega, damping = line.values
-    frequency, powers = omega / (2.0 * np.pi), list[Array]()
-    for number, (run, residual) in enumerate(zip(fit.problem.data.runs, fit.residuals, strict=True)):
+    frequency, drops, floor = omega / (2.0 * np.pi), list[float](), list[Array]()
+    data = fit.problem.data
+    still = {run.id for run in data.in_still_air or data.runs}
+    for number, (run, residual) in enumerate(zip(data.runs, fit.residuals, strict=True)):
+        if run.id not in still:
+            continue
         time_s = run.interval * np.arange(residual.size)
-        waves = np.exp(-damping * omega * time_s) * np.exp(1j * omega * time_s)
-        basis = np.stack([waves.real, waves.imag], axis=1)
+        wave = np.exp(omega * (1j - damping) * time_s)
+        basis = np.stack([wave.real, wave.imag], axis=1)
         rest = residual - basis @ np.linalg.lstsq(basis, residual, rcond=None)[0]
-        bins = np.fft.rfftfreq(residual.size, run.interval)
-        away = np.sign(frequency - resonance(fit, number)) * (bins - frequency) * run.duration
+        drops.append(float(residual @ residual - rest @ rest))
+        cycles = np.fft.rfftfreq(residual.size, run.interval) - frequency
+        away = np.sign(frequency - resonance(fit, number)) * cycles * run.duration
         power = np.abs(np.fft.rfft(rest)) ** 2 / residual.size
-        powers.append(power[(away >= 1.0) & (away <= _FLOOR_BINS + _FLOOR_SHARE * frequency * run.duration)])
-    whole = np.concatenate(powers)
-    return (float(np.mean(whole)), 2.0 * whole.size) if whole.size else (1.0, np.inf)
+        floor.append(power[(away >= 1.0) & (away <= _FLOOR_BINS + _FLOOR_SHARE * frequency * run.duration)])
+    level = np.concatenate(floor)
+    mean = max(float(np.mean(level)), 1.0) if level.size else 1.0
+    free = 2.0 * len(drops)
+    return float(fdtrc(free, max(2.0 * level.size, 1.0), sum(drops) / (free * mean)))
 
 
 _FLOOR_BINS, _FLOOR_SHARE = (

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from scipy.special import bdtrc, chdtrc, fdtrc, stdtr
+from scipy.special import bdtrc, chdtrc, stdtr
 
 from diagnosis.likelihood.least_squares import Fit, FitError, try_fit
 from diagnosis.likelihood.least_squares import fit as refit
-from diagnosis.likelihood.per_run import excited, floor_beside, ringing
+from diagnosis.likelihood.per_run import by_chance, excited, ringing
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.scatter_widths import width_prior
 from diagnosis.likelihood.starting_points import misses_motion, nominal_start, starting_points
@@ -264,14 +264,10 @@ _TRIED = 20_000  # frequencies and dampings of an oscillation, at most
 
 def _rings(white: Fit) -> bool:
     """Whether white residuals contain an oscillation that the release or the input excites, unlike noise."""
-    rate, phases = white.settings.noise.oscillation_rate, 2.0 * len(white.residuals)
-    follows, rings = excited(white), ringing(white)
+    rate, follows, rings = white.settings.noise.oscillation_rate, excited(white), ringing(white)
     if follows is not None and _TRIED * chdtrc(1.0, follows.drop) < rate:
         return True
-    if rings is None:
-        return False
-    floor, freedom = floor_beside(white, rings)
-    return bool(_TRIED * fdtrc(phases, freedom, rings.drop / (phases * max(floor, 1.0))) < rate)
+    return rings is not None and _TRIED * by_chance(white, rings) < rate
 
 
 def _beside_mode(nominal: Fit) -> Fit | None:

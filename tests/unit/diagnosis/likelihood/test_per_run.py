@@ -77,14 +77,15 @@ def test_a_ringing_is_seen_beside_the_motion() -> None:
     assert found.numbers == pytest.approx(OWN, abs=0.7)
 
 
-def test_no_ringing_is_sought_near_the_motion_or_its_harmonics() -> None:
+def test_no_ringing_is_sought_at_the_motion_or_near_its_harmonics() -> None:
     """The nominal fit leaves the harmonics of a hardening spring, by far the strongest lines of its residual."""
     found = ringing(nominal(campaign(effect_from("cubic_stiffness", {"coefficient": 0.3}))))
     assert found is not None
     line = found.values[1] * np.sqrt(1.0 - found.values[2] ** 2)
     for spring in {spring for spring, _ in gap_campaigns.CONDITIONS}:
         own = np.sqrt(spring / gap_campaigns.INERTIA)
-        assert all(abs(line - k * own) > 0.25 * own for k in (1.0, 2.0, 3.0))
+        assert abs(line - own) > 0.04 * own
+        assert all(abs(line - k * own) > 0.25 * own for k in (2.0, 3.0))
 
 
 def test_a_skip_is_placed_to_within_a_few_blocks() -> None:
