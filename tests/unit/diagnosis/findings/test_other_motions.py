@@ -86,9 +86,20 @@ def test_a_second_mode_is_said_only_where_it_may_be_named():
     assert "second mode" not in tried.verdict
 
 
-def test_a_second_mode_is_said_where_the_motion_is_lost():
-    """Sets are then found in stretches, where no second mode is tried: a mode that is larger and decays faster."""
-    answer = diagnose(campaign((0.079, 2.232, 0.24), (0.114, 2.844, 0.93), seconds=9.0))
+LARGER = (0.114, 2.844, 0.93)  # than the motion at the release, and decaying faster
+SWING = (0.079, 2.232, 0.24)
+
+
+def test_a_mode_near_the_motion_is_named_where_the_motion_is_lost():
+    answer = diagnose(campaign(SWING, LARGER, seconds=9.0))
+    assert answer.causes == ("second_mode",)
+    size = answer.candidates[0].parameters["amplitude"]
+    assert size.value == pytest.approx(LARGER[0], abs=4.0 * size.std)
+    assert answer.coefficients.after["omega_n"].value == pytest.approx(2.0 * np.pi * SWING[1], rel=1e-3)
+
+
+def test_a_second_mode_is_said_where_a_third_hides_it():
+    answer = diagnose(campaign(SWING, LARGER, (0.06, 3.7, 0.3), seconds=9.0))
     assert answer.causes == ("unknown",)
     assert "contains a second mode" in answer.verdict
 
