@@ -11,6 +11,7 @@ from diagnosis.findings.input_hold import hold_words
 from diagnosis.findings.other_motions import second_mode_words
 from diagnosis.findings.patch import model_words
 from diagnosis.findings.place import runs_of_the_gap
+from diagnosis.findings.second_inertia import second_inertia_words
 from diagnosis.findings.spring_choices import choice_words, two_springs_words
 from diagnosis.findings.terms import (
     BETWEEN_RUNS,
@@ -170,6 +171,7 @@ def _with_second_modes(said_first: str, answer: Findings) -> list[str]:
 
 RIVALS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
     "two springs off": two_springs_words,
+    "second inertia": second_inertia_words,
     "stated": lambda found: str(found["words"]),
 }
 """Sentences on a rival that is not an effect of the vocabulary, by kind."""

@@ -162,7 +162,7 @@ def with_effects(
         runs.deviate(name, relative)
     runs.change_inputs(
         runs.spring_stiffness.tolist(),
-        lambda spring, drive: drive if drive.on_body else replace(drive, scale=spring),
+        lambda spring, drive: replace(drive, scale=spring) if drive.kind.of_spring else drive,
     )
     return runs
 

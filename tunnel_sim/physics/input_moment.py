@@ -58,6 +58,8 @@ class InputMoment:
         kind: of the input.
         actuator: limits and lag between the samples and the body.
         offset: an added constant moment, which does not pass through the actuator, N m.
+        at_sensor: whether a moment acts at the end of the rod that carries the sensor, as a motor with an encoder
+            does, and not on the body at the other end.
     """
 
     time_s: Times
@@ -68,6 +70,7 @@ class InputMoment:
     kind: InputKind = INPUTS["moment_nm"]
     actuator: ActuatorLimits = DIRECT
     offset: float = 0.0
+    at_sensor: bool = False
 
     def __post_init__(self) -> None:
         """Copy and check the samples."""
@@ -87,7 +90,7 @@ class InputMoment:
     @property
     def on_body(self) -> bool:
         """Whether it acts on the body; else on the rod's upper end, as the spring does."""
-        return not self.kind.of_spring
+        return not (self.kind.of_spring or self.at_sensor)
 
     @cached_property
     def exerted(self) -> InputMoment:
@@ -96,8 +99,8 @@ class InputMoment:
         if self.actuator == DIRECT and offset == self.offset:
             return self
         given = _exerted(Same(self.time_s), Same(self.values), self.held, self.actuator, self.scale)
-        return InputMoment(
-            given.time_s, given.values, self.scale, self.delay, given.held, self.kind, offset=offset
+        return replace(
+            self, time_s=given.time_s, values=given.values, held=given.held, actuator=DIRECT, offset=offset
         )
 
     @cached_property

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from diagnosis.search.rivals.rival import Rival
+from diagnosis.search.rivals.second_inertia import TwoInertias
 from diagnosis.search.rivals.two_springs import TwoSprings
 
 #: Weighed where a diagnosis is not given others.
-RIVALS: tuple[Rival, ...] = (TwoSprings(),)
+RIVALS: tuple[Rival, ...] = (TwoSprings(), TwoInertias())

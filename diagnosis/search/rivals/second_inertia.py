@@ -1,0 +1,250 @@
+"""A cause from outside the vocabulary: a second inertia behind a spring, between the motor of a joint and its link.
+
+The motor turns one inertia, which turns the other by a spring. Read at the motor, the angle has an antiresonance,
+at which the link alone swings on the spring, and above it a resonance; their ratio gives the ratio of the inertias.
+Read at the link, it has the resonance alone, at which its phase falls by half a turn. The moments of the mechanism,
+such as friction, act at the end with the sensor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import pi, sqrt
+from typing import ClassVar, Final, Self
+
+import numpy as np
+from scipy.special import chdtri
+
+from diagnosis.likelihood.least_squares import Fit, try_fit
+from diagnosis.likelihood.problem import Problem
+from diagnosis.likelihood.starting_points import project_out
+from diagnosis.model.fact import Fact
+from diagnosis.model.parameters import Point
+from diagnosis.model.run_data import RunData
+from diagnosis.model.similarity import Similarity
+from diagnosis.search.hypothesis import Hypothesis
+from diagnosis.search.rivals.rival import Rival
+from tunnel_sim.effects import Effect
+from tunnel_sim.effects.base import Drawn
+from tunnel_sim.effects.parameters import parameter
+from tunnel_sim.physics.input_moment import InputMoment
+from tunnel_sim.physics.run_settings import RodTwist, SettingsTable
+from tunnel_sim.vocabulary.record import Array
+
+SECOND_INERTIA_RATE: Final = 1e-3
+"""Rate at which chance alone makes a second inertia explain more than every set of effects. Convention."""
+SECOND_INERTIA_BESIDE: Final = 2
+"""Number of sets of effects beside which a second inertia is tried, beside the nominal model. Judgement. Time
+against coverage."""
+RESONANCE_DRIVEN: Final = 0.05
+"""Minimum amplitude of the input about a resonance, over its greatest, for the resonance to be stated. Judgement.
+Beyond the input's band a delay or a filter looks like a resonance far above it."""
+
+_FRACTION = 0.08  # of the frequency: from one tried to the next
+_CYCLES = 4.0  # of the lowest frequency tried, in the shortest run
+_HIGHEST = 0.6  # of the frequencies that the samples resolve
+_SHARP = 0.03  # damping ratio of the resonances tried
+_STARTS = 3  # resonances of the scan from which fits start
+_FIRST = 6  # iterations, after which the best fit alone continues
+_BAND = 0.1  # of a resonance's frequency, on either side
+_LEAST_RATIO = 0.1  # of the inertias, or its inverse, at a start
+_EVEN = 1.0  # ratio of inertias where the reading does not show it
+_MOST_DAMPED = 0.2  # damping ratio: a resonance of more is a filter or a lag
+
+
+@dataclass(frozen=True)
+class SecondInertia(Effect):
+    """A joint of two inertias, with a spring and a damper between them."""
+
+    channel = "stiffness"
+    condition = "always"
+    autonomous = False
+    driven = True
+    by_angle_in_room = True
+
+    #: Whether the motor turns the inertia that carries the sensor; else the other one.
+    at_motor: ClassVar[bool]
+
+    resonance: float = parameter(
+        "ω", "rad/s", "angular frequency of the resonance with both inertias free", scale=30.0, lower=0.0,
+        upper=1e4, fit_lower=0.1,
+    )  # fmt: skip
+    damping_ratio: float = parameter(
+        "ζ", "1", "share of critical damping", scale=0.01, lower=0.0, upper=0.9, fit_lower=1e-4,
+        fit_upper=_MOST_DAMPED, default=0.01,
+    )  # fmt: skip
+
+    @property
+    def behind(self) -> float:
+        """The inertia at the other end of the spring over the inertia that carries the sensor."""
+        return _EVEN
+
+    @classmethod
+    def on_runs(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Self], drawn: Sequence[Drawn]
+    ) -> None:
+        """Let the spring twist; a motor at the sensor turns that end."""
+        del stated, drawn
+        inertias = runs["yaw_inertia"].tolist()
+        for place, (effect, inertia) in enumerate(zip(effects, inertias, strict=True)):
+            if not effect.is_null:
+                share = 1.0 / (1.0 + effect.behind)
+                stiffness = effect.resonance**2 * inertia * share * (1.0 - share)
+                runs.rod_twist[place] = RodTwist(1.0 / stiffness, share, effect.damping_ratio)
+        runs.change_inputs(effects, cls._turning)
+
+    def _turning(self, drive: InputMoment) -> InputMoment:
+        return replace(drive, at_sensor=self.at_motor and not self.is_null)
+
+
+@dataclass(frozen=True)
+class LinkBehindSpring(SecondInertia):
+    """The sensor is at the motor."""
+
+    name = "link_behind_spring"
+    at_motor = True
+
+    ratio: float = parameter(
+        "Jl/Jm", "1", "inertia of the link over the motor's", scale=0.1, lower=0.0, upper=1e3,
+        fit_lower=0.01, fit_upper=100.0, default=_EVEN,
+    )  # fmt: skip
+
+    @property
+    def behind(self) -> float:
+        """The ratio."""
+        return self.ratio
+
+
+@dataclass(frozen=True)
+class MotorBehindSpring(SecondInertia):
+    """The sensor is at the link; the reading hardly shows the ratio of the inertias."""
+
+    name = "motor_behind_spring"
+    at_motor = False
+
+
+KINDS: tuple[type[SecondInertia], ...] = (LinkBehindSpring, MotorBehindSpring)
+
+
+class TwoInertias(Rival):
+    """A second inertia of a driven joint, beside effects that depend on its angle and rate alone."""
+
+    def hypotheses(
+        self, likely: Sequence[Hypothesis], known: Sequence[Hypothesis], nominal: Fit
+    ) -> list[Hypothesis]:
+        """The joint of two inertias, read at the motor and at the link.
+
+        None where a set of effects explains the readings as well: it has a name.
+        """
+        del likely
+        inputs = nominal.problem.data.inputs
+        if not inputs or not all(drive.kind.by_actuator for drive in inputs):
+            return []
+        sets = sorted((one for one in known if _bearable(one.fit.problem)), key=lambda one: one.fit.total)
+        bases = [Hypothesis((), nominal), *(one for one in sets if one.effects)][: 1 + SECOND_INERTIA_BESIDE]
+        tried = [one for base in bases for kind in KINDS for one in _beside(base, kind)]
+        least = min(one.fit.total for one in (*known, bases[0]))
+        return [one for one in tried if _explains_more(one.fit, least)]
+
+    def fact(self, best: Hypothesis, similarity: Similarity) -> Fact | None:
+        """The frequencies and the ratio of the inertias; None where the input hardly excites the resonance."""
+        kind, fit = next(kind for kind in KINDS if kind.name in best.effects), best.fit
+        names = [f"{kind.name}.{info.name}" for info in kind.parameters()]
+        if any(fit.bound(name) for name in names[1:]):
+            return None
+        omega = fit.value(names[0])
+        if max(_driven_at(run, omega) for run in fit.problem.data.runs) < RESONANCE_DRIVEN:
+            return None
+        places = [fit.problem.names.index(name) for name in names]
+        covariance = (1.0 + max(fit.excess, 0.0)) * fit.stated_covariance[np.ix_(places, places)]
+
+        def hertz(turn: float, slope: Array) -> dict[str, float]:
+            std = sqrt(float(slope @ covariance @ slope))
+            return {
+                "frequency_hz": similarity.own(turn / (2.0 * pi), "Hz"),
+                "std_hz": similarity.own(std / (2.0 * pi), "Hz"),
+            }
+
+        figures: dict[str, object] = {
+            "resonance": hertz(omega, np.eye(len(names))[0]),
+            "beside": [name for name in best.names if name != kind.name],
+        }
+        if kind.at_motor:
+            ratio, std = fit.value(names[-1]), sqrt(float(covariance[-1, -1]))
+            below = 1.0 / sqrt(1.0 + ratio)
+            slope = np.array([below, 0.0, -0.5 * omega * below**3])
+            figures |= {"antiresonance": hertz(omega * below, slope), "ratio": {"value": ratio, "std": std}}
+        return Fact("second inertia", figures)
+
+
+def _bearable(problem: Problem) -> bool:
+    """Whether the engine integrates the effects of a set beside a second inertia."""
+    return all(kind.autonomous and not kind.on_spring for kind in problem.effects) and not problem.free_forms
+
+
+def _explains_more(fitted: Fit, least: float) -> bool:
+    """Whether a fit lowers χ² below the least of all sets by more than chance, whatever both leave."""
+    drop = (least - fitted.total) / (1.0 + max(fitted.excess, 0.0))
+    return drop > float(chdtri(len(fitted.problem.names), SECOND_INERTIA_RATE))
+
+
+def _beside(base: Hypothesis, kind: type[SecondInertia]) -> Iterator[Hypothesis]:
+    """The best fit of a second inertia beside the effects of a set; none where no fit is better than the set."""
+    fits = (
+        fitted
+        for start in _starts(base.fit, kind)
+        if (fitted := try_fit(_with(base.fit.problem, kind), start, max_iterations=_FIRST)) is not None
+    )
+    best = min(fits, key=lambda fitted: fitted.total, default=None)
+    if best is None or best.total >= base.fit.total:
+        return
+    yield Hypothesis((*base.effects, kind.name), try_fit(best.problem, best.point) or best)
+
+
+def _with(problem: Problem, kind: type[SecondInertia]) -> Problem:
+    return replace(problem, effects=(*problem.effects, kind))
+
+
+def _starts(base: Fit, kind: type[SecondInertia]) -> Iterator[Point]:
+    """Points at the resonances that explain most of the residual, if added to the motion of one inertia.
+
+    Each adds A q to the angle, q̈ + 2 ζ ω q̇ + ω² q = ω² M, with A ω² J the ratio of the inertias at the motor and
+    −1 at the link.
+    """
+    runs, drops = base.problem.data.runs, list[tuple[float, float, float]]()
+    moments = [
+        base.problem.stated(base.point.common, own, run).drive
+        for own, run in zip(base.point.per_run, runs, strict=True)
+    ]
+    lowest = 2.0 * pi * _CYCLES / min(run.duration for run in runs)
+    highest = _HIGHEST * pi / max(run.interval for run in runs)
+    for omega in np.exp(np.arange(np.log(lowest), np.log(highest), _FRACTION)).tolist():
+        column = [
+            run.scaled(moment.oscillation(omega, _SHARP, run.times, run.derivative))
+            for run, moment in zip(runs, moments, strict=True)
+            if moment is not None
+        ]
+        added = project_out(base, column)
+        power = sum(float(one @ one) for one in added)
+        size = sum(float(a @ r) for a, r in zip(added, base.residuals, strict=True)) / max(power, 1e-300)
+        drops.append((size**2 * power, omega, size))
+    tops = [
+        here
+        for before, here, after in zip(drops, drops[1:], drops[2:], strict=False)
+        if here[0] > max(before[0], after[0])
+    ]
+    inertia = float(np.median(base.linear[:, 0]))
+    for _, omega, size in sorted(tops, reverse=True)[:_STARTS]:
+        ratio = float(np.clip(size * omega**2 * inertia, _LEAST_RATIO, 1.0 / _LEAST_RATIO))
+        own = (omega, _SHARP, ratio)[: len(kind.parameters())]
+        yield Point(np.concatenate([base.point.common, own]), base.point.per_run)
+
+
+def _driven_at(run: RunData, omega: float) -> float:
+    """The greatest amplitude of the input about a frequency (rad/s), over its greatest amplitude."""
+    values = run.input_means - np.mean(run.input_means)
+    size = np.abs(np.fft.rfft(values * np.hanning(values.size)))
+    turn = 2.0 * pi * np.fft.rfftfreq(values.size, run.interval)
+    near = size[np.abs(turn / omega - 1.0) < _BAND]
+    return float(near.max(initial=0.0) / size.max())
