@@ -24,8 +24,8 @@ def second_inertia_words(found: Mapping[str, Any]) -> str:
         )
     ratio = for_people(found["ratio"]["value"], found["ratio"]["std"], "1")
     return (
-        f"{first}an antiresonance at {_hertz(found['antiresonance'])} and {resonance}: the angle is measured at the "
-        f"motor, and the link's inertia is {ratio} times the motor's. Lock the link, or measure its angle, too."
+        f"{first}an antiresonance at {_hertz(found['antiresonance'])} and {resonance}: the angle is measured at "
+        f"the motor, and the link's inertia is {ratio} times the motor's. Lock the link, or measure its angle, too."
     )
 
 

@@ -10,20 +10,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from math import pi, sqrt
+from math import hypot, pi, sqrt
 from typing import ClassVar, Final, Self
 
 import numpy as np
 from scipy.special import chdtri
 
-from diagnosis.likelihood.least_squares import Fit, try_fit
+from diagnosis.likelihood.least_squares import Fit, scaled_residuals, try_fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import project_out
 from diagnosis.model.fact import Fact
 from diagnosis.model.parameters import Point
 from diagnosis.model.run_data import RunData
 from diagnosis.model.similarity import Similarity
-from diagnosis.search.hypothesis import Hypothesis
+from diagnosis.search.hypothesis import Hypothesis, restricted
 from diagnosis.search.rivals.rival import Rival
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.base import Drawn
@@ -145,7 +145,8 @@ class TwoInertias(Rival):
         bases = [Hypothesis((), nominal), *(one for one in sets if one.effects)][: 1 + SECOND_INERTIA_BESIDE]
         tried = [one for base in bases for kind in KINDS for one in _beside(base, kind)]
         least = min(one.fit.total for one in (*known, bases[0]))
-        return [one for one in tried if _explains_more(one.fit, least)]
+        better = [one for one in tried if _explains_more(one.fit, least)]
+        return [one for one in better if all(_adds(one, other) for other in better)]
 
     def fact(self, best: Hypothesis, similarity: Similarity) -> Fact | None:
         """The frequencies and the ratio of the inertias; None where the input hardly excites the resonance."""
@@ -158,9 +159,11 @@ class TwoInertias(Rival):
             return None
         places = [fit.problem.names.index(name) for name in names]
         covariance = (1.0 + max(fit.excess, 0.0)) * fit.stated_covariance[np.ix_(places, places)]
+        # the unexplained share of the twist's amplitude may shift a resonance by as large a share of its half-width
+        shift = sqrt(max(fit.excess, 0.0) * fit.count / _power(fit, best.names, kind)) * fit.value(names[1])
 
         def hertz(turn: float, slope: Array) -> dict[str, float]:
-            std = sqrt(float(slope @ covariance @ slope))
+            std = hypot(sqrt(float(slope @ covariance @ slope)), shift * turn)
             return {
                 "frequency_hz": similarity.own(turn / (2.0 * pi), "Hz"),
                 "std_hz": similarity.own(std / (2.0 * pi), "Hz"),
@@ -171,7 +174,8 @@ class TwoInertias(Rival):
             "beside": [name for name in best.names if name != kind.name],
         }
         if kind.at_motor:
-            ratio, std = fit.value(names[-1]), sqrt(float(covariance[-1, -1]))
+            ratio = fit.value(names[-1])
+            std = hypot(sqrt(float(covariance[-1, -1])), 2.0 * (1.0 + ratio) * shift)
             below = 1.0 / sqrt(1.0 + ratio)
             slope = np.array([below, 0.0, -0.5 * omega * below**3])
             figures |= {"antiresonance": hertz(omega * below, slope), "ratio": {"value": ratio, "std": std}}
@@ -187,6 +191,12 @@ def _explains_more(fitted: Fit, least: float) -> bool:
     """Whether a fit lowers χ² below the least of all sets by more than chance, whatever both leave."""
     drop = (least - fitted.total) / (1.0 + max(fitted.excess, 0.0))
     return drop > float(chdtri(len(fitted.problem.names), SECOND_INERTIA_RATE))
+
+
+def _adds(one: Hypothesis, other: Hypothesis) -> bool:
+    """Whether a set has an effect more than another one for a reason: it explains more than by chance."""
+    larger = set(one.effects) > set(other.effects)
+    return not larger or _explains_more(one.fit, other.fit.total)
 
 
 def _beside(base: Hypothesis, kind: type[SecondInertia]) -> Iterator[Hypothesis]:
@@ -237,8 +247,16 @@ def _starts(base: Fit, kind: type[SecondInertia]) -> Iterator[Point]:
     inertia = float(np.median(base.linear[:, 0]))
     for _, omega, size in sorted(tops, reverse=True)[:_STARTS]:
         ratio = float(np.clip(size * omega**2 * inertia, _LEAST_RATIO, 1.0 / _LEAST_RATIO))
-        own = (omega, _SHARP, ratio)[: len(kind.parameters())]
+        start = {"resonance": omega, "damping_ratio": _SHARP, "ratio": ratio}
+        own = [start[info.name] for info in kind.parameters()]
         yield Point(np.concatenate([base.point.common, own]), base.point.per_run)
+
+
+def _power(fitted: Fit, names: Sequence[str], kind: type[SecondInertia]) -> float:
+    """Sum of squares of the second inertia's part of the readings, in noise variances."""
+    rigid = restricted(fitted, [name for name in names if name != kind.name])
+    without = scaled_residuals(rigid.problem, rigid.point)
+    return sum(float(np.sum((a - b) ** 2)) for a, b in zip(without, fitted.residuals, strict=True))
 
 
 def _driven_at(run: RunData, omega: float) -> float:
