@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from diagnosis.findings.terms import plain
-from identification.show.numbers import for_people
+from identification.show.numbers import for_people, plain
 
 
 def second_inertia_words(found: Mapping[str, Any]) -> str:

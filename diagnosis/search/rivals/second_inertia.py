@@ -159,8 +159,10 @@ class TwoInertias(Rival):
             return None
         places = [fit.problem.names.index(name) for name in names]
         covariance = (1.0 + max(fit.excess, 0.0)) * fit.stated_covariance[np.ix_(places, places)]
+        ratio = fit.value(names[-1]) if kind.at_motor else _EVEN
         # the unexplained share of the twist's amplitude may shift a resonance by as large a share of its half-width
-        shift = sqrt(max(fit.excess, 0.0) * fit.count / _power(fit, best.names, kind)) * fit.value(names[1])
+        left = sqrt(max(fit.excess, 0.0) * fit.count / _power(fit, best.names, kind)) * fit.value(names[1])
+        shift = hypot(left, _by_damping(fit, omega, ratio))
 
         def hertz(turn: float, slope: Array) -> dict[str, float]:
             std = hypot(sqrt(float(slope @ covariance @ slope)), shift * turn)
@@ -174,7 +176,6 @@ class TwoInertias(Rival):
             "beside": [name for name in best.names if name != kind.name],
         }
         if kind.at_motor:
-            ratio = fit.value(names[-1])
             std = hypot(sqrt(float(covariance[-1, -1])), 2.0 * (1.0 + ratio) * shift)
             below = 1.0 / sqrt(1.0 + ratio)
             slope = np.array([below, 0.0, -0.5 * omega * below**3])
@@ -250,6 +251,17 @@ def _starts(base: Fit, kind: type[SecondInertia]) -> Iterator[Point]:
         start = {"resonance": omega, "damping_ratio": _SHARP, "ratio": ratio}
         own = [start[info.name] for info in kind.parameters()]
         yield Point(np.concatenate([base.point.common, own]), base.point.per_run)
+
+
+def _by_damping(fitted: Fit, omega: float, ratio: float) -> float:
+    """The shift of a resonance, as a share, where the damping of the mechanism acts on the other inertia.
+
+    The law has it at the sensor. In a resonance of damping ratio C/(2 J ω), with the reduced inertia J, it changes
+    the frequency by half the square at most.
+    """
+    inertia, damping, _ = np.median(fitted.linear, axis=0).tolist()
+    reduced = inertia * ratio / (1.0 + ratio) ** 2
+    return 0.5 * float(damping / (2.0 * reduced * omega)) ** 2
 
 
 def _power(fitted: Fit, names: Sequence[str], kind: type[SecondInertia]) -> float:
