@@ -143,7 +143,7 @@ class TwoInertias(Rival):
             return []
         sets = sorted((one for one in known if _bearable(one.fit.problem)), key=lambda one: one.fit.total)
         bases = [Hypothesis((), nominal), *(one for one in sets if one.effects)][: 1 + SECOND_INERTIA_BESIDE]
-        tried = [one for base in bases for kind in KINDS for one in _beside(base, kind)]
+        tried = [one for base in bases for one in _beside(base)]
         least = min(one.fit.total for one in (*known, bases[0]))
         better = [one for one in tried if _explains_more(one.fit, least)]
         return [one for one in better if all(_adds(one, other) for other in better)]
@@ -152,10 +152,8 @@ class TwoInertias(Rival):
         """The frequencies and the ratio of the inertias; None where the input hardly excites the resonance."""
         kind, fit = next(kind for kind in KINDS if kind.name in best.effects), best.fit
         names = [f"{kind.name}.{info.name}" for info in kind.parameters()]
-        if any(fit.bound(name) for name in names[1:]):
-            return None
-        omega = fit.value(names[0])
-        if max(_driven_at(run, omega) for run in fit.problem.data.runs) < RESONANCE_DRIVEN:
+        omega, ends = fit.value(names[0]), [fit.bound(name) for name in names[2:]]
+        if any(ends) or fit.bound(names[1]) == "upper" or not _is_driven(fit.problem, omega):
             return None
         places = [fit.problem.names.index(name) for name in names]
         covariance = (1.0 + max(fit.excess, 0.0)) * fit.stated_covariance[np.ix_(places, places)]
@@ -200,28 +198,24 @@ def _adds(one: Hypothesis, other: Hypothesis) -> bool:
     return not larger or _explains_more(one.fit, other.fit.total)
 
 
-def _beside(base: Hypothesis, kind: type[SecondInertia]) -> Iterator[Hypothesis]:
-    """The best fit of a second inertia beside the effects of a set; none where no fit is better than the set."""
-    fits = (
-        fitted
-        for start in _starts(base.fit, kind)
-        if (fitted := try_fit(_with(base.fit.problem, kind), start, max_iterations=_FIRST)) is not None
-    )
-    best = min(fits, key=lambda fitted: fitted.total, default=None)
-    if best is None or best.total >= base.fit.total:
-        return
-    yield Hypothesis((*base.effects, kind.name), try_fit(best.problem, best.point) or best)
+def _beside(base: Hypothesis) -> Iterator[Hypothesis]:
+    """The best fits of a second inertia beside the effects of a set, read at either end, where they are better."""
+    resonances = _resonances(base.fit)
+    for kind in KINDS:
+        problem = replace(base.fit.problem, effects=(*base.fit.problem.effects, kind))
+        starts = (_start(base.fit, kind, *one) for one in resonances)
+        tried = (try_fit(problem, start, max_iterations=_FIRST) for start in starts)
+        best = min(filter(None, tried), key=lambda fitted: fitted.total, default=None)
+        if best is not None and best.total < base.fit.total:
+            yield Hypothesis((*base.effects, kind.name), try_fit(problem, best.point) or best)
 
 
-def _with(problem: Problem, kind: type[SecondInertia]) -> Problem:
-    return replace(problem, effects=(*problem.effects, kind))
+def _resonances(base: Fit) -> list[tuple[float, float]]:
+    """The resonances that explain most of the residual, if added to the motion of one inertia.
 
-
-def _starts(base: Fit, kind: type[SecondInertia]) -> Iterator[Point]:
-    """Points at the resonances that explain most of the residual, if added to the motion of one inertia.
-
-    Each adds A q to the angle, q̈ + 2 ζ ω q̇ + ω² q = ω² M, with A ω² J the ratio of the inertias at the motor and
-    −1 at the link.
+    Returns:
+        Angular frequencies, rad/s, and the moment's coefficient A of each, rad/(N m): A q is added to the angle,
+        q̈ + 2 ζ ω q̇ + ω² q = ω² M.
     """
     runs, drops = base.problem.data.runs, list[tuple[float, float, float]]()
     moments = [
@@ -230,27 +224,34 @@ def _starts(base: Fit, kind: type[SecondInertia]) -> Iterator[Point]:
     ]
     lowest = 2.0 * pi * _CYCLES / min(run.duration for run in runs)
     highest = _HIGHEST * pi / max(run.interval for run in runs)
-    for omega in np.exp(np.arange(np.log(lowest), np.log(highest), _FRACTION)).tolist():
+    tried = np.exp(np.arange(np.log(lowest), np.log(highest), _FRACTION)).tolist()
+    for omega in (one for one in tried if _is_driven(base.problem, one)):
         column = [
-            run.scaled(moment.oscillation(omega, _SHARP, run.times, run.derivative))
+            np.zeros(run.reading.size)
+            if moment is None
+            else run.scaled(moment.oscillation(omega, _SHARP, run.times, run.derivative))
             for run, moment in zip(runs, moments, strict=True)
-            if moment is not None
         ]
         added = project_out(base, column)
         power = sum(float(one @ one) for one in added)
         size = sum(float(a @ r) for a, r in zip(added, base.residuals, strict=True)) / max(power, 1e-300)
         drops.append((size**2 * power, omega, size))
+    padded = [(0.0, 0.0, 0.0), *drops, (0.0, 0.0, 0.0)]
     tops = [
         here
-        for before, here, after in zip(drops, drops[1:], drops[2:], strict=False)
+        for before, here, after in zip(padded, drops, padded[2:], strict=True)
         if here[0] > max(before[0], after[0])
     ]
-    inertia = float(np.median(base.linear[:, 0]))
-    for _, omega, size in sorted(tops, reverse=True)[:_STARTS]:
-        ratio = float(np.clip(size * omega**2 * inertia, _LEAST_RATIO, 1.0 / _LEAST_RATIO))
-        start = {"resonance": omega, "damping_ratio": _SHARP, "ratio": ratio}
-        own = [start[info.name] for info in kind.parameters()]
-        yield Point(np.concatenate([base.point.common, own]), base.point.per_run)
+    return [(omega, size) for _, omega, size in sorted(tops, reverse=True)[:_STARTS]]
+
+
+def _start(base: Fit, kind: type[SecondInertia], omega: float, size: float) -> Point:
+    """Where a fit starts: at the motor A ω² J is the ratio of the inertias, at the link −1."""
+    ratio = size * omega**2 * float(np.median(base.linear[:, 0]))
+    within = float(np.clip(ratio, _LEAST_RATIO, 1.0 / _LEAST_RATIO))
+    start = {"resonance": omega, "damping_ratio": _SHARP, "ratio": within}
+    own = [start[info.name] for info in kind.parameters()]
+    return Point(np.concatenate([base.point.common, own]), base.point.per_run)
 
 
 def _by_damping(fitted: Fit, omega: float, ratio: float) -> float:
@@ -271,7 +272,12 @@ def _power(fitted: Fit, names: Sequence[str], kind: type[SecondInertia]) -> floa
     return sum(float(np.sum((a - b) ** 2)) for a, b in zip(without, fitted.residuals, strict=True))
 
 
-def _driven_at(run: RunData, omega: float) -> float:
+def _is_driven(problem: Problem, omega: float) -> bool:
+    """Whether the input of a run excites an oscillation (rad/s): its lines nearby are not small beside its greatest."""
+    return any(run.drive is not None and _part_at(run, omega) > RESONANCE_DRIVEN for run in problem.data.runs)
+
+
+def _part_at(run: RunData, omega: float) -> float:
     """The greatest amplitude of the input about a frequency (rad/s), over its greatest amplitude."""
     values = run.input_means - np.mean(run.input_means)
     size = np.abs(np.fft.rfft(values * np.hanning(values.size)))
