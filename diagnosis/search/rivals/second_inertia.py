@@ -273,7 +273,7 @@ def _power(fitted: Fit, names: Sequence[str], kind: type[SecondInertia]) -> floa
 
 
 def _is_driven(problem: Problem, omega: float) -> bool:
-    """Whether the input of a run excites an oscillation (rad/s): its lines nearby are not small beside its greatest."""
+    """Whether the input of a run excites an oscillation (rad/s): lines about it are not small beside the greatest."""
     return any(run.drive is not None and _part_at(run, omega) > RESONANCE_DRIVEN for run in problem.data.runs)
 
 
