@@ -239,7 +239,7 @@ def _resonances(base: Fit) -> list[tuple[float, float]]:
     padded = [(0.0, 0.0, 0.0), *drops, (0.0, 0.0, 0.0)]
     tops = [
         here
-        for before, here, after in zip(padded, drops, padded[2:], strict=True)
+        for before, here, after in zip(padded[:-2], drops, padded[2:], strict=True)
         if here[0] > max(before[0], after[0])
     ]
     return [(omega, size) for _, omega, size in sorted(tops, reverse=True)[:_STARTS]]
@@ -273,7 +273,7 @@ def _power(fitted: Fit, names: Sequence[str], kind: type[SecondInertia]) -> floa
 
 
 def _is_driven(problem: Problem, omega: float) -> bool:
-    """Whether the input of a run excites an oscillation (rad/s): lines about it are not small beside the greatest."""
+    """Whether the input of a run excites an oscillation (rad/s): its lines there are not small."""
     return any(run.drive is not None and _part_at(run, omega) > RESONANCE_DRIVEN for run in problem.data.runs)
 
 
