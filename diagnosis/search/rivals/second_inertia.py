@@ -37,6 +37,9 @@ SECOND_INERTIA_RATE: Final = 1e-3
 SECOND_INERTIA_BESIDE: Final = 2
 """Number of sets of effects beside which a second inertia is tried, beside the nominal model. Judgement. Time
 against coverage."""
+PARTNER_LEAVES: Final = 0.5
+"""Maximum χ² of a second inertia beside an effect, over its χ² alone, for the effect to be stated beside it. Judgement.
+The law has the damping at one end, and an effect may make up for that."""
 RESONANCE_DRIVEN: Final = 0.05
 """Minimum amplitude of the input about a resonance, over its greatest, for the resonance to be stated. Judgement.
 Beyond the input's band a delay or a filter looks like a resonance far above it."""
@@ -193,9 +196,10 @@ def _explains_more(fitted: Fit, least: float) -> bool:
 
 
 def _adds(one: Hypothesis, other: Hypothesis) -> bool:
-    """Whether a set has an effect more than another one for a reason: it explains more than by chance."""
+    """Whether a set has an effect more than another one for a reason: it leaves much less, and not by chance."""
     larger = set(one.effects) > set(other.effects)
-    return not larger or _explains_more(one.fit, other.fit.total)
+    much = one.fit.total < PARTNER_LEAVES * other.fit.total
+    return not larger or (much and _explains_more(one.fit, other.fit.total))
 
 
 def _beside(base: Hypothesis) -> Iterator[Hypothesis]:
