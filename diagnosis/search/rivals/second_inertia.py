@@ -38,7 +38,7 @@ SECOND_INERTIA_BESIDE: Final = 2
 """Number of sets of effects beside which a second inertia is tried, beside the nominal model. Judgement. Time
 against coverage."""
 PARTNER_LEAVES: Final = 0.5
-"""Maximum χ² beside an effect, over that of a second inertia alone, for the effect to be stated beside it. Judgement.
+"""Maximum χ² beside an effect, over that of a second inertia alone, for an effect to be stated with it. Judgement.
 The law has the damping at one end, and an effect may make up for that."""
 RESONANCE_DRIVEN: Final = 0.05
 """Minimum amplitude of the input about a resonance, over its greatest, for the resonance to be stated. Judgement.
