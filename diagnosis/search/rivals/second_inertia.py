@@ -138,17 +138,20 @@ class TwoInertias(Rival):
     ) -> list[Hypothesis]:
         """The joint of two inertias, read at the motor and at the link.
 
-        None where a set of effects explains the readings as well: it has a name.
+        None where a set of effects explains the readings as well, or down to their noise: it has a name.
         """
         del likely
         inputs = nominal.problem.data.inputs
         if not inputs or not all(drive.kind.by_actuator for drive in inputs):
             return []
+        fits = [*(one.fit for one in known), nominal]
+        least = min(fits, key=lambda fit: fit.total)
+        if least.total - least.count < chdtri(len(least.problem.names), SECOND_INERTIA_RATE):
+            return []
         sets = sorted((one for one in known if _bearable(one.fit.problem)), key=lambda one: one.fit.total)
         bases = [Hypothesis((), nominal), *(one for one in sets if one.effects)][: 1 + SECOND_INERTIA_BESIDE]
         tried = [one for base in bases for one in _beside(base)]
-        least = min(one.fit.total for one in (*known, bases[0]))
-        better = [one for one in tried if _explains_more(one.fit, least)]
+        better = [one for one in tried if _explains_more(one.fit, least.total)]
         return [one for one in better if all(_adds(one, other) for other in better)]
 
     def fact(self, best: Hypothesis, similarity: Similarity) -> Fact | None:
