@@ -8,7 +8,7 @@ import pytest
 from scipy.linalg import expm
 
 from diagnosis import diagnose
-from diagnosis.search.weigh import UNKNOWN
+from diagnosis.search.answer import UNKNOWN
 from tests.marks import slow
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
