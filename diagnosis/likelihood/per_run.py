@@ -18,6 +18,13 @@ from tunnel_sim.vocabulary.record import Array
 MODE_RUNS: Final = 0.5
 """Minimum share of the runs in which a second mode must be distinct from the motion. Convention."""
 
+FLOOR_CYCLES: Final = 4.0
+"""Width of the band beside a ringing in which the floor of the noise is measured, in cycles in a run. Judgement.
+A few independent frequencies in every run."""
+FLOOR_SHARE: Final = 0.05
+"""Further width of this band, as a share of the ringing's frequency. Judgement. The half-width of a resonance with
+a damping ratio of 0.05."""
+
 _RINGING_PADDING = 4  # zero padding of the spectra
 _DECAYS = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0)  # of a ringing in one run, nepers
 _MOST_SKIPS, _SWEEPS = 3, 4  # skips sought in a run, and how often each is sought again beside the others
@@ -112,7 +119,7 @@ def ringing(fit: Fit) -> Sought | None:
     return Sought((mean, omega, float(rate) / omega), np.angle(found), float(drops[best][at]))
 
 
-def by_chance(fit: Fit, line: Sought) -> float:
+def ringing_p_value(fit: Fit, line: Sought) -> float:
     """P-value of a ringing at its frequency, on the floor of the noise next to it.
 
     A mode that the release excites stands on the floor, in still air too. Noise with a resonance is as strong next
@@ -136,17 +143,12 @@ def by_chance(fit: Fit, line: Sought) -> float:
         cycles = np.fft.rfftfreq(residual.size, run.interval) - frequency
         away = np.sign(frequency - resonance(fit, number)) * cycles * run.duration
         power = np.abs(np.fft.rfft(rest)) ** 2 / residual.size
-        floor.append(power[(away >= 1.0) & (away <= _FLOOR_BINS + _FLOOR_SHARE * frequency * run.duration)])
+        floor.append(power[(away >= 1.0) & (away <= FLOOR_CYCLES + FLOOR_SHARE * frequency * run.duration)])
     level = np.concatenate(floor)
     mean = max(float(np.mean(level)), 1.0) if level.size else 1.0
     free = 2.0 * len(drops)
     return float(fdtrc(free, max(2.0 * level.size, 1.0), sum(drops) / (free * mean)))
 
-
-_FLOOR_BINS, _FLOOR_SHARE = (
-    4.0,
-    0.05,
-)  # width of the band: cycles in a run, and a share of the line's frequency
 
 _DAMPINGS = (0.003, 0.01, 0.03, 0.1)  # of a mode that the input excites
 _APART = 0.02  # frequencies tried, relative: within the half-power width of the dampings, or near it

@@ -12,7 +12,7 @@ from scipy.special import bdtrc, chdtrc, stdtr
 
 from diagnosis.likelihood.least_squares import Fit, FitError, try_fit
 from diagnosis.likelihood.least_squares import fit as refit
-from diagnosis.likelihood.per_run import by_chance, excited, ringing
+from diagnosis.likelihood.per_run import excited, ringing, ringing_p_value
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.scatter_widths import width_prior
 from diagnosis.likelihood.starting_points import misses_motion, nominal_start, starting_points
@@ -259,7 +259,7 @@ def _in_still_air(nominal: Fit) -> Iterator[Fit]:
             yield refit(Problem(only), nominal_start(only))
 
 
-_TRIED = 20_000  # frequencies and dampings of an oscillation, at most
+_TRIED = 20_000  # frequencies and dampings of an oscillation: the independent ones of 8,000 block means
 
 
 def _rings(white: Fit) -> bool:
@@ -267,7 +267,7 @@ def _rings(white: Fit) -> bool:
     rate, follows, rings = white.settings.noise.oscillation_rate, excited(white), ringing(white)
     if follows is not None and _TRIED * chdtrc(1.0, follows.drop) < rate:
         return True
-    return rings is not None and _TRIED * by_chance(white, rings) < rate
+    return rings is not None and _TRIED * ringing_p_value(white, rings) < rate
 
 
 def _beside_mode(nominal: Fit) -> Fit | None:

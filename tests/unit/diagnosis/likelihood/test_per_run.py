@@ -13,7 +13,7 @@ from scipy.interpolate import CubicSpline
 from scipy.special import chdtrc
 
 from diagnosis.likelihood.least_squares import Fit, fit
-from diagnosis.likelihood.per_run import by_chance, ringing, skip
+from diagnosis.likelihood.per_run import ringing, ringing_p_value, skip
 from diagnosis.likelihood.starting_points import starting_points
 from tests.support import gap_campaigns
 from tests.support.gap_campaigns import campaign, nominal
@@ -110,7 +110,7 @@ def test_a_mode_stands_on_the_floor_beside_it_and_noise_with_a_resonance_does_no
     line = ringing(base)
     assert line is not None
     assert chdtrc(2.0 * len(base.residuals), line.drop) < 1e-9  # in white noise each would be a mode
-    assert least <= by_chance(base, line) <= most
+    assert least <= ringing_p_value(base, line) <= most
 
 
 def test_a_skip_is_placed_to_within_a_few_blocks() -> None:
