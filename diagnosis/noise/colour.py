@@ -11,6 +11,7 @@ below some corner; a random walk's is not, because its zero departs ever further
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -186,7 +187,6 @@ def whitened(data: Data, colour: Colour) -> Data:
 
 
 _LOWEST_CORNER = 1e-3  # of the colour's lowest frequency: effectively none
-_CORNERS = (1.0, 4.0, 16.0)  # of the colour's lowest frequency, to start from
 _WHITE = 30.0  # the level's natural logarithm stays within this distance of white noise
 
 
@@ -195,8 +195,8 @@ def zero_wanders(nominal: Fit, colour: Colour) -> bool:
 
     The decision is a likelihood ratio. The spectrum adds white noise and a first-order process, which is a
     random walk where its corner is zero; the colour's lowest band is the lowest visible corner of stationary noise.
-    It is fitted to the ordinates between the harmonics by Whittle's likelihood (P. Whittle, Ark. Mat. 2 (1953) 423,
-    doi 10.1007/BF02590998).
+    Noise that resonates is stationary too, although its flank is steep. The spectrum is fitted to the ordinates
+    between the harmonics by Whittle's likelihood (P. Whittle, Ark. Mat. 2 (1953) 423, doi 10.1007/BF02590998).
     """
     spectra = []
     for index, (run, residual) in enumerate(zip(nominal.problem.data.runs, nominal.residuals, strict=True)):
@@ -205,9 +205,9 @@ def zero_wanders(nominal: Fit, colour: Colour) -> bool:
         spectra.append((whole.frequency[whole.between], whole.power[whole.between]))
     frequency, power = (np.concatenate(column) for column in zip(*spectra, strict=True))
     relative = frequency / colour.frequency[0]
-    seen = _least_loss(relative, power, 1.0)
-    free = min(seen, _least_loss(relative, power, _LOWEST_CORNER))
-    return bool(2.0 * (seen - free) / HANN > chdtri(1, 2.0 * nominal.settings.noise.wandering_rate))
+    steady = min(process.least_loss(relative, power) for process in _STEADY)
+    free = min(steady, _WANDERING.least_loss(relative, power))
+    return bool(2.0 * (steady - free) / HANN > chdtri(1, 2.0 * nominal.settings.noise.wandering_rate))
 
 
 def alike_in_all_runs(fit: Fit) -> bool:
@@ -235,18 +235,65 @@ def alike_in_all_runs(fit: Fit) -> bool:
     return bool(chance.min() * chance.size < fit.settings.noise.repeated_rate)
 
 
-def _least_loss(frequency: Array, power: Array, lowest: float) -> float:
-    """Least negative log-likelihood, nats, with the corner at or above a frequency (relative to the lowest)."""
+def _first_order(frequency: Array, corner: float) -> tuple[Array, list[Array]]:
+    """Power of a first-order process, not normalised, and its slopes by the logarithms of its parameters."""
+    response = 1.0 / (frequency**2 + corner**2)
+    return response, [-2.0 * (corner * response) ** 2]
 
-    def loss(place: Array) -> tuple[float, Array]:
-        white, slow, corner = np.exp(place)
-        response = 1.0 / (frequency**2 + corner**2)
-        level = white + slow * response
-        by_level = (1.0 - power / level) / level
-        slopes = white, slow * response, -2.0 * slow * (corner * response) ** 2
-        total = float(np.sum(np.log(level) + power / level))
-        return total, np.array([float(np.sum(by_level * slope)) for slope in slopes])
 
-    bounds = [(-_WHITE, _WHITE), (-_WHITE, _WHITE), (np.log(lowest), _WHITE)]
-    starts = [np.array([0.0, np.log(power.max() * c**2 + 1.0), np.log(c)]) for c in (lowest, *_CORNERS)]
-    return min(float(minimize(loss, start, jac=True, bounds=bounds).fun) for start in starts)
+def _second_order(frequency: Array, corner: float, damping_ratio: float) -> tuple[Array, list[Array]]:
+    """Power of a process that resonates at its corner; as in `_first_order`."""
+    damped = (2.0 * damping_ratio * corner * frequency) ** 2
+    response = 1.0 / ((frequency**2 - corner**2) ** 2 + damped)
+    by_corner = 2.0 * damped - 4.0 * corner**2 * (frequency**2 - corner**2)
+    return response, [-by_corner * response**2, -2.0 * damped * response**2]
+
+
+@dataclass(frozen=True)
+class _Process:
+    """A stationary process whose spectrum is level below its corner; or not, where the corner may be low.
+
+    Args:
+        lowest: corner, over the lowest visible one.
+        starts: corners to start from, likewise.
+        damping: damping ratios of a resonance, lowest and highest; empty for a process of first order.
+    """
+
+    power: Callable[..., tuple[Array, list[Array]]]
+    lowest: float
+    starts: tuple[float, ...]
+    damping: tuple[tuple[float, float], ...] = ()
+
+    def least_loss(self, frequency: Array, power: Array) -> float:
+        """Least negative log-likelihood of periodogram ordinates, nats, beside white noise.
+
+        Args:
+            frequency: over the lowest visible corner.
+        """
+
+        def loss(place: Array) -> tuple[float, Array]:
+            white, slow, *own = np.exp(place)
+            response, by_own = self.power(frequency, *own)
+            level = white + slow * response
+            by_level = (1.0 - power / level) / level
+            slopes = white, slow * response, *(slow * slope for slope in by_own)
+            total = float(np.sum(np.log(level) + power / level))
+            return total, np.array([float(np.sum(by_level * slope)) for slope in slopes])
+
+        order = 2 + 2 * len(self.damping)
+        bounds = [(-_WHITE, _WHITE), (-_WHITE, order * _WHITE / 2), (np.log(self.lowest), _WHITE)]
+        bounds += [(np.log(low), np.log(high)) for low, high in self.damping]
+        starts = [
+            np.array(
+                [0.0, np.log(power.max() * c**order + 1.0), np.log(c), *(high for _, high in bounds[3:])]
+            )
+            for c in self.starts
+        ]
+        return min(float(minimize(loss, start, jac=True, bounds=bounds).fun) for start in starts)
+
+
+_STEADY = (
+    _Process(_first_order, 1.0, (1.0, 4.0, 16.0)),
+    _Process(_second_order, 1.0, (2.0, 4.0, 8.0, 16.0), ((0.003, 0.7),)),
+)
+_WANDERING = _Process(_first_order, _LOWEST_CORNER, (_LOWEST_CORNER, 1.0, 4.0, 16.0))

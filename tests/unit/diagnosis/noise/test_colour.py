@@ -24,6 +24,9 @@ from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.record import Record
 
 COLOURS = ("ar1", "ar2", "pink")
+NEAR = "near the motion"
+#: Recursions of noise from white noise, by name; the last resonates at 0.74 times the softer spring's motion.
+POLES = {"ar1": [1.0, -0.9], "ar2": [1.0, -1.6, 0.8], NEAR: [1.0, -1.97787, 0.97914]}
 
 
 def colour(name, count, rng):
@@ -33,7 +36,7 @@ def colour(name, count, rng):
         frequency = np.fft.rfftfreq(white.size)
         values = np.fft.irfft(np.fft.rfft(white) / np.sqrt(np.maximum(frequency, frequency[1])))
     else:
-        values = lfilter([1.0], [1.0, -0.9] if name == "ar1" else [1.0, -1.6, 0.8], white)
+        values = lfilter([1.0], POLES[name], white)
     return values[2000:] / np.std(values)
 
 
@@ -98,12 +101,18 @@ def test_a_zero_that_wanders_is_a_gap_and_no_colour(zero):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", COLOURS)
+@pytest.mark.parametrize("name", [*COLOURS, NEAR])
 def test_coloured_noise_is_taken_for_a_wandering_zero_no_more_often_than_stated(name):
     trials = 60
     fits = [nominal(coloured(campaign(seed=seed), name, seed=seed)) for seed in range(trials)]
     alarms = sum(zero_wanders(before, noise_colour(before)) for before in fits)
     assert alarms <= binom.ppf(1.0 - 1e-4, trials, Settings().noise.wandering_rate)
+
+
+def test_noise_that_resonates_near_the_motion_is_a_colour():
+    _, noise, found = judged(coloured(campaign(), NEAR, 3.0))
+    assert not found.detected
+    assert noise.colour is not None
 
 
 def warming(count, _rng):
