@@ -7,7 +7,7 @@ Introduction to Stochastic Control Theory (1970); Maine & Iliff, NASA RP-1077 (1
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -45,6 +45,9 @@ _INTERVAL = 0.012  # s between the residuals the filter sees: well above the rig
 _SETTLE = 1.0  # s left out at the start: the transient of the filter
 _FEWEST = 16  # residuals of a run: two in each band in which they are compared with white noise
 _OF_NOISE = (0.3, 3.0, 30.0, 300.0)  # noise of first order in the reading tried, over its white noise
+_RINGS_AT = 3  # strongest frequencies of the residual at which a sensor may ring
+_RINGS_FOR = (0.003, 0.01, 0.03, 0.1, 0.3)  # its damping ratios tried
+_UNSTEADY = np.linspace(-1.5, 1.5, 7) * np.log(2.0)  # logarithms of intensities over the fitted one
 _EVALUATIONS = 60  # of the likelihood beyond the starting grid
 
 
@@ -62,6 +65,8 @@ class ProcessNoise:
         excess: mean squared scaled innovation minus one, dimensionless.
         innovations: scaled, by run in which it acts.
         interval: between innovations, s.
+        intensities: likeliest intensity in each third of the runs over the fitted one, shape (3,), dimensionless.
+        unsteady_drop: further drop of −2 ln L with these intensities, dimensionless.
     """
 
     spectrum: Spectrum
@@ -72,6 +77,8 @@ class ProcessNoise:
     excess: float
     innovations: list[Array]
     interval: float
+    intensities: Array
+    unsteady_drop: float
 
     @property
     def drop(self) -> float:
@@ -254,7 +261,27 @@ def _fitted(channels: Sequence[_Channel], spectrum: Spectrum, cost: float) -> Pr
         sum(float(i @ i) for i in innovations) / count - 1.0,
         list(innovations),
         channels[0].interval,
+        *_by_third(channels, spectrum),
     )
+
+
+def _by_third(channels: Sequence[_Channel], spectrum: Spectrum) -> tuple[Array, float]:
+    """The likeliest intensity in each third of the runs, over the fitted one, and the drop of −2 ln L by them."""
+    costs = np.zeros((_UNSTEADY.size, 3))
+    for row, factor in zip(costs, np.exp(_UNSTEADY).tolist(), strict=True):
+        other = tuple(replace(part, intensity=factor * part.intensity) for part in spectrum)
+        for cost, scaled in _filtered(channels, [other] * len(channels)):
+            if not np.isfinite(cost):
+                return np.ones(3), 0.0
+            log_spread = (cost - scaled @ scaled) / scaled.size
+            row += [part.size * log_spread + part @ part for part in np.array_split(scaled, 3)]
+    place = np.clip(np.argmin(costs, axis=0), 1, _UNSTEADY.size - 2)
+    below, at, above = (costs[place + step, range(3)] for step in (-1, 0, 1))
+    turn = np.clip((below - above) / np.maximum(2.0 * (below - 2.0 * at + above), 1e-12), -1.0, 1.0)
+    least = at - 0.25 * turn * (below - above)  # of the parabola through three intensities
+    step = _UNSTEADY[1] - _UNSTEADY[0]
+    drop = float(costs[_UNSTEADY.size // 2].sum() - least.sum())
+    return np.exp(_UNSTEADY[place] + turn * step), drop
 
 
 def _powers(channels: Sequence[_Channel], spectrum: Spectrum) -> Array:
@@ -276,29 +303,85 @@ def _unit(channels: Sequence[_Channel]) -> float:
 def is_of_reading(fit: Fit, process: ProcessNoise) -> bool:
     """Whether noise of the reading explains the runs better than a random moment does.
 
-    A wandering zero, and coloured noise of the sensor, are of first order in the reading itself. A random moment
-    shows through the motion that it drives, whose spectrum has a peak at the natural frequency.
+    A wandering zero, and coloured noise of the sensor, are of first order in the reading itself. A sensor that
+    rings is of second order, at a frequency of its own. A random moment shows through the motion that it drives:
+    its spectrum has a peak at the natural frequency of every run.
     """
+    channels = [c for c in _channels(fit) if c.run.id in process.runs]
+    noise = float(np.sqrt(np.median([c.variance for c in channels])))
+    wanders = [(r * noise, b) for r in _OF_NOISE for b in (0.01, 0.1, 1.0, LONGEST_BANDWIDTH)]
+    swing = float(np.sqrt(np.median([np.mean(c.residual**2) for c in channels])))
+    rings = [(swing, z, f) for z in _RINGS_FOR for f in _strongest(channels)]
+    return any(
+        _reading_drop(channels, system, grid) > process.drop
+        for system, grid in ((_wandering_zero, wanders), (_ringing_sensor, rings))
+    )
+
+
+def _strongest(channels: Sequence[_Channel]) -> list[float]:
+    """The strongest angular frequencies of the residuals of all runs, rad/s, each apart from the others."""
+    grid = np.geomspace(
+        1.0 / min(c.residual.size * c.interval for c in channels),
+        0.4 / max(c.interval for c in channels),
+        400,
+    )
+    power = np.zeros(grid.size)
+    for channel in channels:
+        spectrum = (
+            np.abs(np.fft.rfft(channel.residual, 4 * channel.residual.size)) ** 2 / channel.residual.size
+        )
+        power += np.interp(grid, np.fft.rfftfreq(4 * channel.residual.size, channel.interval), spectrum)
+    found = list[float]()
+    for _ in range(_RINGS_AT):
+        best = float(grid[int(np.argmax(power))])
+        found.append(2.0 * np.pi * best)
+        power[np.abs(grid / best - 1.0) < 0.05] = 0.0
+    return found
+
+
+def _wandering_zero(std: float, bandwidth: float) -> tuple[Array, Array]:
+    """Dynamics and drive of noise of first order; std in rad, bandwidth in Hz."""
+    corner = 2.0 * np.pi * bandwidth
+    return np.array([[-corner]]), np.array([[2.0 * corner * std**2]])
+
+
+def _ringing_sensor(std: float, damping_ratio: float, omega: float) -> tuple[Array, Array]:
+    """Dynamics and drive of noise of second order; std in rad, omega in rad/s."""
+    dynamics = np.array([[0.0, 1.0], [-(omega**2), -2.0 * damping_ratio * omega]])
+    return dynamics, np.diag([0.0, 4.0 * damping_ratio * omega**3 * std**2])
+
+
+def _reading_drop(
+    channels: Sequence[_Channel],
+    system: Callable[..., tuple[Array, Array]],
+    grid: Sequence[tuple[float, ...]],
+) -> float:
+    """Drop of −2 ln L by noise of the reading, from linear dynamics of positive parameters."""
     from scipy.signal import lfilter  # only here: slow to load
 
-    channels = [c for c in _channels(fit) if c.run.id in process.runs]
-    kept = [c.residual[_skip(c) :] for c in channels]
     interval, variance = (np.array([getattr(c, name) for c in channels]) for name in ("interval", "variance"))
 
     def cost(x: Array) -> float:
-        std, bandwidth = np.exp(x)
-        stay = np.exp(-2.0 * np.pi * bandwidth * interval)[:, None, None]
-        filters = steady_filters(stay, std**2 * (1.0 - stay**2), variance)
+        dynamics, drive = (np.stack([one] * len(channels)) for one in system(*np.exp(x).tolist()))
+        filters = steady_filters(*discretised(dynamics, drive, interval), variance)
         return sum(
-            _cost(lfilter(numerator, denominator, residual), spread)
-            for residual, (numerator, denominator, spread) in zip(kept, filters, strict=True)
+            _cost(lfilter(numerator, denominator, c.residual)[_skip(c) :], spread)
+            if 0.0 < spread < np.inf
+            else np.inf
+            for c, (numerator, denominator, spread) in zip(channels, filters, strict=True)
         )
 
-    noise = float(np.sqrt(np.median(variance)))
-    grid: Array = np.log([(r * noise, b) for r in _OF_NOISE for b in (0.01, 0.1, 1.0, LONGEST_BANDWIDTH)])
-    start = grid[int(np.argmin([cost(x) for x in grid]))]
-    found = minimize(cost, start, method="Nelder-Mead", options={"maxfev": _EVALUATIONS, "fatol": 0.5})
-    return sum(c.white_cost for c in channels) - float(found.fun) > process.drop
+    points = np.log(grid)
+    start = points[int(np.argmin([cost(x) for x in points]))]
+    steps = np.diag([0.5, 0.5, 0.02][: len(start)])
+    simplex = np.vstack([start, start + steps])
+    found = minimize(
+        cost,
+        start,
+        method="Nelder-Mead",
+        options={"maxfev": _EVALUATIONS * len(start) // 2, "fatol": 0.5, "initial_simplex": simplex},
+    )
+    return sum(c.white_cost for c in channels) - float(found.fun)
 
 
 def with_response(fit: Fit, spectrum: Spectrum) -> Data | None:

@@ -21,6 +21,10 @@ first-order. With the true sets of unblinded campaigns it is at most 9.0."""
 BURST_POWER: Final = 1.5
 """Maximum power of short innovations of a steady moment, relative to chance. Judgement. Real turbulence is
 not exactly stationary."""
+FADING: Final = 1.5
+"""Ratio of the intensity in the first third of the runs to the intensity in the last third, above which a moment
+fades with the motion. Judgement. The rest of a motion that a model misses decays with it; the surroundings and the
+wind do not know when a run began. Real turbulence is not exactly stationary."""
 STEADY_LINE_SHARE: Final = 0.9
 """Share of the residual explained by a line with a phase per run, above which the moment is a line. Judgement
 (decision 0046). A line explains nine tenths of a random moment whose half-width is a twentieth of one over
@@ -34,7 +38,10 @@ _LINE_WIDTHS = 3.0  # about the centre of a spectrum in which a line is sought
 
 
 def is_steady_noise(result: ProcessNoise, chosen: RandomMomentSettings) -> bool:
-    """Whether innovations are white and steady, without bursts, and not of one run alone."""
+    """Whether innovations are white and steady, without bursts, and not of one run alone, and do not fade."""
+    first, *_, last = result.intensities
+    if first > FADING * last and result.unsteady_drop > chosen.acts_from:
+        return False
     return (
         departure_from_white(result) <= WHITE_INNOVATIONS
         and bursts(result, chosen.burst_rate) <= BURST_POWER

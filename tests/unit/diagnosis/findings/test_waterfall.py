@@ -145,8 +145,18 @@ def test_a_random_moment_comes_last_and_leaves_its_innovations(data, base):
     kind = effect_class("buffeting")
     best = added(base, IDLE)
     windy = tuple(run.id for run in data.runs if run.wind_on)
+    innovations = [np.ones(9)] * 4
     process = ProcessNoise(
-        (SpectrumPart(0.01, 5.0),), windy, np.full(4, 2.5), np.ones(4), 5.0, 0.25, [np.ones(9)] * 4, 0.012
+        (SpectrumPart(0.01, 5.0),),
+        windy,
+        np.full(4, 2.5),
+        np.ones(4),
+        5.0,
+        0.25,
+        innovations,
+        0.012,
+        np.ones(3),
+        0.0,
     )
     layer = MomentLayer((kind,), process, FittedSet((kind.name, IDLE), 0.01, np.zeros(6)))
     own = Hypothesis((IDLE,), best, moment=layer)

@@ -17,7 +17,8 @@ from diagnosis.search.process_noise import MomentLayer, is_of_reading, likeliest
 from diagnosis.search.random_moments import obeys_a_law, weigh_random_moments
 from diagnosis.search.random_spectra import STREAM, SURROUNDINGS
 from diagnosis.search.scatter import differing
-from diagnosis.search.steady_noise import is_a_line, is_slow
+from diagnosis.search.steady_noise import is_a_line, is_slow, is_steady_noise
+from diagnosis.settings import Settings
 from tests.marks import slow
 from tests.reference.linear_rig import response
 from tests.support.gap_campaigns import (
@@ -199,23 +200,51 @@ def test_a_missing_law_is_no_random_moment(conditions: Sequence[tuple[float, flo
         assert weigh_random_moments(whole_runs(base, ALL_RANDOM), []) == []
 
 
-@pytest.mark.parametrize("bandwidth", [slow(0.05), 5.0])
-def test_noise_of_the_reading_is_no_random_moment(bandwidth: float) -> None:
-    """Truth: noise of first order added to the readings, a zero that wanders or a sensor's coloured noise."""
+FIRST_ORDER = {bandwidth: np.exp(-2.0 * np.pi * bandwidth * INTERVAL) for bandwidth in (0.05, 5.0)}
+RINGING = (
+    2.0 * 0.98 * np.cos(2.0 * np.pi * 2.2 * INTERVAL)
+)  # 2.2 Hz: 1.14 times the motion of the softer spring
+
+
+@pytest.mark.parametrize(
+    "recursion",
+    [slow([1.0, -FIRST_ORDER[0.05]]), [1.0, -FIRST_ORDER[5.0]], [1.0, -RINGING, 0.98**2]],
+    ids=["wandering zero", "coloured", "ringing sensor"],
+)
+def test_noise_of_the_reading_is_no_random_moment(recursion: list[float]) -> None:
+    """Truth: noise added to the readings."""
     rng, runs, data = np.random.default_rng(8), [], of(STILL)
-    pole = np.exp(-2.0 * np.pi * bandwidth * INTERVAL)
     for run in data.runs:
-        white = rng.standard_normal(run.record.yaw_rad.size)
-        wander = 2e-3 * lfilter([np.sqrt(1.0 - pole**2)], [1.0, -pole], white)
-        runs.append(replace(run, record=Record(run.record.time_s, run.record.yaw_rad + wander)))
+        noise = lfilter([1.0], recursion, rng.standard_normal(run.record.yaw_rad.size + 2000))[2000:]
+        reading = run.record.yaw_rad + 2e-3 * noise / np.std(noise)
+        runs.append(replace(run, record=Record(run.record.time_s, reading)))
     base = nominal(replace(data, runs=tuple(runs)))
     process = min(random_moments(base, SURROUNDINGS), key=lambda one: one.cost)
     assert process.drop > 100.0  # it would take it up
     assert is_of_reading(base, process)
     assert weigh_random_moments(whole_runs(base, ALL_RANDOM), []) == []
+
+
+def test_a_moment_is_not_of_the_reading_and_does_not_fade() -> None:
     shaking = nominal(shaken(of(STILL), STILL, moment=0.02))
     process = min(random_moments(shaking, SURROUNDINGS), key=lambda one: one.cost)
     assert not is_of_reading(shaking, process)
+    assert process.intensities == pytest.approx(np.ones(3), abs=0.3)
+    assert is_steady_noise(process, Settings().moment)
+
+
+def test_a_motion_that_the_model_misses_fades_and_is_no_random_moment() -> None:
+    """Truth: a second mode of a tenth of a degree that dies with the motion, in every run with its own phase."""
+    rng, runs, data = np.random.default_rng(10), [], of(STILL)
+    for run in data.runs:
+        time = run.record.time_s
+        mode = 2e-3 * np.exp(-0.3 * time) * np.cos(2.0 * np.pi * (2.1 * time + rng.uniform()))
+        runs.append(replace(run, record=Record(time, run.record.yaw_rad + mode)))
+    base = nominal(replace(data, runs=tuple(runs)))
+    process = min(random_moments(base, SURROUNDINGS), key=lambda one: one.cost)
+    assert process.drop > 100.0
+    assert process.intensities[0] > 2.0 * process.intensities[-1]
+    assert not is_steady_noise(process, Settings().moment)
 
 
 def test_a_steady_line_is_no_random_moment() -> None:

@@ -87,7 +87,7 @@ def test_an_effect_that_the_others_cannot_show_is_not_contradicted() -> None:
 def moment(drop: float) -> ProcessNoise:
     """A random moment of the six runs that lowers −2 ln L by so much."""
     names = tuple(f"r{i}" for i in range(1, 7))
-    return ProcessNoise((), names, np.full(6, drop / 6.0), np.ones(6), 0.0, 0.0, [], 0.01)
+    return ProcessNoise((), names, np.full(6, drop / 6.0), np.ones(6), 0.0, 0.0, [], 0.01, np.ones(3), 0.0)
 
 
 def test_a_random_moment_explains_no_more_than_is_missing() -> None:
