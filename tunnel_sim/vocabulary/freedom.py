@@ -18,8 +18,8 @@ from functools import cache
 from math import pi
 from typing import Any, Literal, TypeVar, cast
 
-from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.input_kinds import INPUTS, InputColumn
+from tunnel_sim.vocabulary.errors import TunnelError, one_of
+from tunnel_sim.vocabulary.input_kinds import INPUTS, InputColumn, InputKind
 
 Motion = Literal["angle", "displacement"]
 """What a sensor measures, or the derivatives of what: the angle or the displacement of the body."""
@@ -37,8 +37,11 @@ class Freedom:
     Args:
         columns: of a run file that may hold the reading, with factors to SI, by quantity; the first is written.
         inputs: columns of a run file that may hold an input, with the column of that kind of input for an angle.
+        input_units: of inputs in files of instruments, with their factors to SI, by the column for an angle; those
+            of an angle are among the traits of each kind.
         keys: keys of ``campaign.toml`` that have another name, with the name for an angle.
         refused: keys of ``campaign.toml`` that the freedom does not have.
+        condition_units: of these keys in files of instruments, with the unit for an angle and the factor to it.
         units: of readings in files of instruments, with their factors to SI, by quantity; those of an angle are
             among the units of all columns.
         shown: by SI unit of a reading, the mark of the unit in which it is shown, and the factor.
@@ -51,8 +54,10 @@ class Freedom:
     motion: Motion
     columns: Mapping[str, Mapping[str, float]]
     inputs: Mapping[str, InputColumn]
+    input_units: Mapping[InputColumn, Mapping[str, float]] = field(default_factory=dict)
     keys: Mapping[str, str] = field(default_factory=dict)
     refused: tuple[str, ...] = ()
+    condition_units: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     units: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     shown: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     turns: bool = True
@@ -165,14 +170,17 @@ class Freedom:
         except TunnelError as error:
             if not self._words:
                 raise
-            own = TunnelError(
-                self.words(error.what),
-                where=error.where,
-                remedy=self.words(error.remedy),
-                options=error.options,
-                parts=error.parts,
-            )
-            raise own from error
+            raise self.refusal(error) from error
+
+    def refusal(self, error: TunnelError, names: Collection[str] = ()) -> TunnelError:
+        """A refusal in the freedom's own words; names as in `words`."""
+        return TunnelError(
+            self.words(error.what, names),
+            where=error.where,
+            remedy=self.words(error.remedy, names),
+            options=error.options,
+            parts=[self.refusal(part, names) for part in error.parts],
+        )
 
     # ---- files
 
@@ -205,9 +213,49 @@ class Freedom:
         """Keys of ``campaign.toml`` under the freedom's names, without those that it does not have."""
         return tuple(self.as_own(dict.fromkeys(key for key in keys if key not in self.refused)))
 
+    def condition(self, name: str, unit: str) -> tuple[str, str, float]:
+        """Name and unit of a condition in a file of an instrument, as for an angle, and the factor to that unit."""
+        plain = re.split(r"\s*[(\[{<]", name.strip())[0]
+        return self.keys.get(plain, name), *self.condition_units.get(unit, (unit, 1.0))
+
     def own_input(self, column: str) -> str:
         """The column of an input in a run file, for the column of its kind."""
         return next(name for name, kind in self.inputs.items() if kind == column)
+
+    def stated_input(self, column: str, where: str) -> InputColumn:
+        """The column for an angle of a kind of input that is stated under the freedom's own name.
+
+        Raises:
+            TunnelError: for the name of an input of another freedom.
+        """
+        if column not in self.inputs:
+            what = f"'{column}' is not an input of a motion = '{self.motion}'"
+            raise TunnelError(what, where=where, remedy=f"give {one_of(tuple(self.inputs))}")
+        return self.inputs[column]
+
+    def input_kind(self, name: str, unit: str) -> InputKind | None:
+        """The kind of input shown by name and unit of a column in an instrument's file; None: neither shows it."""
+        name = self.inputs.get(name.strip().lower(), name) if self.input_units else name
+        if self.input_units and unit not in ("", "counts"):
+            held = (INPUTS[column].unit for column, units in self.input_units.items() if unit in units)
+            unit = next(held, "unknown")
+        return next(
+            (kind for kind in map(INPUTS.__getitem__, self.inputs.values()) if kind.holds(name, unit)), None
+        )
+
+    def input_factor(self, kind: InputKind, unit: str) -> float:
+        """From a unit of a file to the unit of a kind of input; 1 for an unknown unit."""
+        if not self.input_units:
+            return kind.factor(unit)
+        return self.input_units.get(kind.column, {}).get(unit, 1.0)
+
+    def input_unit(self, name: str, unit: str) -> str:
+        """The unit of an input's column as `input_units` spells it: the stated one, or the one in its name."""
+        if not self.input_units:
+            return unit
+        found = _OWN_UNIT.search(name)
+        plain = (unit or (found[1].replace("_", "/") if found else "")).translate(_PLAIN)
+        return "kN" if plain == "kn" else plain  # a knot measures wind only
 
 
 _CONSTANT = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?) rad\b")
@@ -249,6 +297,8 @@ ANGLE = Freedom(
 )  # fmt: skip
 """The yaw angle of a body in a tunnel, or the angle of a joint."""
 
+_LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
+_ACCELERATIONS = {"m/s2": 1.0, "cm/s2": 1e-2, "mm/s2": 1e-3, "g": _G, "mg": 1e-3 * _G}
 _NOUN = r"\b(the|a|its|of|by|small|large|smaller|larger|free|wide|whole|first|each|every|per|own|\d+)( )"
 DISPLACEMENT = Freedom(
     "displacement",
@@ -261,12 +311,20 @@ DISPLACEMENT = Freedom(
         "force_n": "moment_nm", "drive": "drive", "base_m": "base_rad", "command_m": "command_rad",
         "base_acceleration_m_s2": "base_acceleration_rad_s2",
     },
+    input_units={
+        "moment_nm": {"N": 1.0, "mN": 1e-3, "cN": 1e-2, "kN": 1e3},
+        "base_rad": _LENGTHS, "command_rad": _LENGTHS, "base_acceleration_rad_s2": _ACCELERATIONS,
+    },
     keys={"mass": "yaw_inertia", "release_displacement": "release_angle"},
+    condition_units={
+        "N/m": ("N m/rad", 1.0), "N/mm": ("N m/rad", 1e3), "kN/m": ("N m/rad", 1e3),
+        "kg": ("kg m2", 1.0), "g": ("kg m2", 1e-3), **{unit: ("rad", size) for unit, size in _LENGTHS.items()},
+    },
     refused=("wind_speed", "air_density", "frontal_area", "reference_length", "width"),
     units={
-        "angle": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6},
+        "angle": _LENGTHS,
         "rate": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3},
-        "acceleration": {"m/s2": 1.0, "cm/s2": 1e-2, "mm/s2": 1e-3, "g": _G, "mg": 1e-3 * _G},
+        "acceleration": _ACCELERATIONS,
     },
     shown={"m": ("mm", 1e3), "m/s": ("mm/s", 1e3), "m/s2": ("m/s²", 1.0)},
     turns=False,
@@ -337,7 +395,7 @@ DISPLACEMENT = Freedom(
         (r"\b([Aa])n angular\b", r"\1n"),
         (r"\b[Aa]ngular (acceleration|rate|velocity)", r"\1"),
         (r"\b([Aa])n angle\b", r"\1 displacement"),
-        (r"(?<!')\b[Aa]ngle(s?)\b", r"displacement\1"),
+        (r"(?<!')(?<!--)\b[Aa]ngle(s?)\b", r"displacement\1"),
         (r"\b([Aa])n inertia\b", r"\1 mass"),
         (r"\b[Ii]nertias\b", "masses"),
         (r"\b[Ii]nertia\b", "mass"),
@@ -361,14 +419,23 @@ DISPLACEMENT = Freedom(
 FREEDOMS: Mapping[str, Freedom] = {one.motion: one for one in (ANGLE, DISPLACEMENT)}
 """By their motion."""
 
+OwnInputColumn = Literal[InputColumn, "force_n", "base_m", "command_m"]
+"""The columns of a run file that may hold its input, of any freedom."""
+
+OWN_INPUT_COLUMNS = tuple(dict.fromkeys(name for one in FREEDOMS.values() for name in one.inputs))
+"""All of them."""
+
 
 def column_unit(name: str) -> str:
-    """The unit in the name of a column of a displacement, as the format writes it, such as ``mm``; empty: none."""
+    """The unit in the name of a displacement's column, of the format or such as ``pos_mm``; empty: none."""
     known = (column for columns in DISPLACEMENT.columns.values() for column in columns)
-    if name not in known:
-        return ""
-    length, *per = name.removeprefix("x_").split("_")
-    return "/".join([length, *per])
+    found = (_OWN_UNIT if name in known else _PLAIN_UNIT).search(name)
+    return found[1].replace("_", "/") if found else ""
+
+
+def freedom_of_column(name: str, unit: str) -> Freedom:
+    """The freedom of a reading, by the name of its column and its unit there, which may be empty."""
+    return ANGLE if linear_unit(unit or column_unit(name)) is None else DISPLACEMENT
 
 
 def linear_unit(text: str) -> tuple[str, str, float] | None:
@@ -381,6 +448,8 @@ def linear_unit(text: str) -> tuple[str, str, float] | None:
 
 
 _PLAIN = str.maketrans({"²": "2", "^": None, "µ": "u", "μ": "u", "*": None})
+_PLAIN_UNIT = re.compile(r"(?<=[_\s])((?:mm|[cuµ]m)(?:[_/]s[2²]?)?|m[_/]s[2²])$")
+_OWN_UNIT = re.compile(r"(?<=[_\s])((?:[mcuµ]?m)(?:[_/]s[2²]?)?|g|mg|[mck]?N)$")
 
 
 def freedom_of_unit(unit: str) -> Freedom:
