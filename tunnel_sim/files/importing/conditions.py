@@ -119,15 +119,15 @@ def find_conditions(
             what = f"no column or number '{one_line(text, 40)}' that states {key}"
             raise TunnelError(what, where=where, remedy=f"--set {key}: {did_you_mean(text, known)}")
     hints += [hint for name, text in table.texts.items() if (hint := _hint_of_text(name, text)) is not None]
-    remarks += _unused_statements(table, claimed)
+    remarks += _unused_statements(table, claimed, freedom)
     return Stated(numbers, columns, hints=tuple(hints), like=tuple(like)), remarks
 
 
-def _unused_statements(table: Table, claimed: Mapping[str, str]) -> list[str]:
+def _unused_statements(table: Table, claimed: Mapping[str, str], freedom: Freedom) -> list[str]:
     """A remark on the numbers and texts of a table that are neither used nor reported otherwise."""
     found = []
     for heading, value in table.facts.items():
-        name, unit = split_unit(heading)
+        name, unit, _ = freedom.condition(*split_unit(heading))
         used = condition_of(name, unit, alone=True) is not None or any(
             claims(text, name, unit) for text in claimed.values()
         )
