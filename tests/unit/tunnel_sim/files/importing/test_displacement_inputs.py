@@ -143,3 +143,17 @@ def test_a_force_beside_an_angle_stays_out(tmp_path: Path) -> None:
     (run,) = read_records([file_of(tmp_path, "time (s),yaw (rad),torque (Nm)", READING, PUSH)]).campaign.runs
     assert run.drive is not None
     assert run.drive.column == "moment_nm"
+
+
+def test_a_table_of_conditions_has_own_names_and_units(tmp_path: Path) -> None:
+    table = tmp_path / "runs.csv"
+    table.write_text("file,k (N/mm),release_displacement (mm)\nlog.csv,0.05,20\n")
+    path = file_of(tmp_path, "time (s),x (mm),force (N)", 1e3 * READING, PUSH)
+    (run,) = read_records([path], conditions=table).campaign.runs
+    assert run.spring_stiffness == pytest.approx(50.0)
+    assert run.release_angle == pytest.approx(0.02)
+    path = file_of(tmp_path, "time (s),yaw (rad),torque (Nm)", READING, PUSH)
+    with pytest.raises(
+        TunnelError, match=r"'k \(N/mm\)' is of a displacement, and the readings are of an angle"
+    ):
+        read_records([path], conditions=table)
