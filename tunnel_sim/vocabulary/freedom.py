@@ -18,6 +18,7 @@ from functools import cache
 from math import pi
 from typing import Any, Literal, TypeVar, cast
 
+from tunnel_sim.vocabulary.dimensions import dimension, unit_text
 from tunnel_sim.vocabulary.errors import TunnelError, one_of
 from tunnel_sim.vocabulary.input_kinds import INPUTS, InputColumn, InputKind
 
@@ -74,6 +75,23 @@ class Freedom:
             unit = re.sub(old, new, unit)
         return unit
 
+    def angle_unit(self, unit: str) -> str:
+        """The unit for an angle of a quantity that has some unit here, such as ``N m/rad`` for ``N/m``."""
+        if not self._units:
+            return unit
+        kg, metres, seconds = dimension(unit)
+        return unit_text({"N": kg, "m": kg, "s": seconds + 2.0 * kg, "rad": metres - kg})
+
+    @property
+    def scales(self) -> bool:
+        """Whether the motion may be computed at another size, so that every power of its unit counts."""
+        return not self.turns
+
+    @property
+    def stated(self) -> dict[str, str]:
+        """Its statement in a document or a file; an angle goes unsaid."""
+        return {"motion": self.motion} if self._units else {}
+
     def scale(self, size: float) -> float:
         """The factor with which a motion is computed; a power of two, so that it changes no digit.
 
@@ -83,7 +101,7 @@ class Freedom:
             size: the greatest motion, in SI.
         """
         low, high = _SWING
-        if self.turns or not size > 0.0 or low <= size <= high:
+        if not self.scales or not size > 0.0 or low <= size <= high:
             return 1.0
         power = 0
         while size * 2.0**power < _USUAL_SWING / 2.0**0.5:
@@ -106,7 +124,7 @@ class Freedom:
         if name in _KEPT:
             return value
         if isinstance(value, str):
-            if name == "unit":
+            if "unit" in (name, owner):
                 return "1/s" if owner in _FREQUENCIES else self.unit(value)
             return self.words(value, names) if name in _SENTENCES else value
         if isinstance(value, Mapping):
@@ -406,7 +424,7 @@ DISPLACEMENT = Freedom(
         (r"\b[Ss]wing(s?)\b", r"move\1"),
         # symbols
         (r"\bIzz\b", "m"),
-        (r"\bKr\b", "k"),
+        (r"\bKr\b(?!\*)", "k"),  # a formula has names of its own
         (r"\bCr\b", "c"),
         ("β\u0308", "x\u0308"),
         ("β\u0307", "x\u0307"),
