@@ -202,8 +202,11 @@ class Freedom:
 
     # ---- files
 
-    def as_angle(self, table: Mapping[str, Any], where: str) -> dict[str, Any]:
+    def as_angle(self, table: Mapping[str, Any], where: str, *, imported: bool = False) -> dict[str, Any]:
         """A table of ``campaign.toml`` under the keys of an angle.
+
+        Args:
+            imported: whether it is about the files of an import, whose units state the motion.
 
         Raises:
             TunnelError: for a key that the freedom does not have.
@@ -218,7 +221,9 @@ class Freedom:
                 wrong, right, motion = (key, own, ANGLE) if other is self else (own, key, other)
                 if table.get(wrong) is not None:
                     what = f"'{wrong}' is stated, but not motion = '{motion.motion}'"
-                    remedy = f"give {right}, or state motion = '{motion.motion}' under [sensor]"
+                    unit = "rad" if motion.turns else "m"
+                    stated = f"--unit {unit}" if imported else f"motion = '{motion.motion}' under [sensor]"
+                    remedy = f"give {right}, or state {stated}"
                     raise TunnelError(what, where=where, remedy=remedy)
         return {self.keys.get(key, key): value for key, value in table.items()}
 

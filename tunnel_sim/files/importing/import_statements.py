@@ -66,7 +66,7 @@ class ImportStatements:
                 what, where=shown(self.table.path), remedy="give it in the unit of an angle, or --unit"
             )
         stated = self.choices.conditions.model_dump(exclude_none=True)
-        own = freedom.as_angle(stated, "--set")
+        own = freedom.as_angle(stated, "--set", imported=True)
         if not freedom.windy:
             own = {"wind_speed": 0.0, **own}
         return replace(self, choices=self.choices.model_copy(update={"conditions": Conditions(**own)}))

@@ -10,8 +10,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from tests.support.linear import FORBIDDEN
+from tests.support.robot_logs import JOINT_STATE, START_NS, joint_state, write_mcap
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.condition_names import Conditions
 from tunnel_sim.files.importing.records import Imported, read_records
 from tunnel_sim.files.importing.writing import import_records
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -157,3 +159,25 @@ def test_a_table_of_conditions_has_own_names_and_units(tmp_path: Path) -> None:
         TunnelError, match=r"'k \(N/mm\)' is of a displacement, and the readings are of an angle"
     ):
         read_records([path], conditions=table)
+
+
+def test_a_prismatic_joint_of_a_robot_log(tmp_path: Path) -> None:
+    """Its message names no unit; ``--unit m`` makes it a displacement, whose effort is in N."""
+    stamps = START_NS + np.round(1e9 * TIME).astype(np.int64)
+    messages = [
+        ("/joint_states", JOINT_STATE, stamp, joint_state(stamp, ["slide"], [x], (), [force]))
+        for stamp, x, force in zip(stamps.tolist(), READING.tolist(), PUSH.tolist(), strict=True)
+    ]
+    write_mcap(tmp_path / "slide.mcap", messages)
+    choices = ImportChoices(unit="m", input_as="force_n")
+    (run,) = read_records([tmp_path / "slide.mcap"], choices).campaign.runs
+    np.testing.assert_allclose(run.record.yaw_rad, READING, rtol=1e-9, atol=1e-12)
+    assert run.drive is not None
+    assert run.drive.column == "moment_nm"
+    np.testing.assert_allclose(run.drive.values, PUSH)
+
+
+def test_a_mass_of_an_angle_is_asked_about(tmp_path: Path) -> None:
+    path = file_of(tmp_path, "time (s),signal", READING)
+    with pytest.raises(TunnelError, match=r"'mass' is stated, .*; give yaw_inertia, or state --unit m$"):
+        read_records([path], ImportChoices(conditions=Conditions(mass=2.0)))
