@@ -375,6 +375,7 @@ DISPLACEMENT = Freedom(
         (r"bearing and the potentiometer", "guide and the sensor"),
         (r"(natural frequency of small )swings( \[)rad/s", r"\1motions\g<2>1/s"),
         (r"(ωn\s*\[)rad/s", r"\g<1>1/s"),
+        (r"(ωn²\s*\[)rad²/s²", r"\g<1>1/s²"),
         (r"with other springs, wind speeds and release angles", "with other springs and release displacements"),
         (r"needed for Izz, Cr, Cnβ and Cnr", "needed for the mass and the damping"),
         # clauses about the air

@@ -142,3 +142,15 @@ def test_a_wind_is_refused_in_one_line(tunnel: Tunnel, files: dict[Path, float],
     assert "leave wind_speed out" in said
     assert said.count("\n") == 1
     assert not out.exists()
+
+
+def test_springs_give_the_mass(tunnel: Tunnel, tmp_path: Path) -> None:
+    table = tmp_path / "springs.csv"
+    rows = "".join(f"{k},{np.sqrt(k / MASS) / (2.0 * np.pi):.9f}\n" for k in (50.0, 90.0, 140.0, 200.0))
+    table.write_text(f"stiffness_N_per_m,frequency_Hz\n{rows}")
+    status, printed, _ = tunnel("springs", table)
+    assert status == 0
+    assert float(re.search(r"m \(gradient\) = (\S+)", printed)[1]) == pytest.approx(MASS, rel=1e-6)  # type: ignore[index]
+    assert "k [N/m]" in printed
+    assert "ωn² [1/s²]" in printed
+    assert not re.search(FORBIDDEN, printed.replace(str(tmp_path), ""))
