@@ -171,8 +171,9 @@ def _records(
             given = replace(driven, values=driven.values[rows[clean.rows]])
             missing = int(np.count_nonzero(~np.isfinite(given.values)))
             if missing:
+                name = FREEDOMS[columns.reading.motion].own_input(driven.role)
                 raise TunnelError(
-                    f"the input {driven.role} has no number at {missing} of {given.values.size} samples",
+                    f"the input {name} has no number at {missing} of {given.values.size} samples",
                     where=where,
                     remedy="give one value for each sample of the reading, on the same clock, or --input none",
                 )
