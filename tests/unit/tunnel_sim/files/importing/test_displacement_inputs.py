@@ -7,10 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 from scipy.integrate import solve_ivp
 
 from tests.support.linear import FORBIDDEN
 from tests.support.robot_logs import JOINT_STATE, START_NS, joint_state, write_mcap
+from tunnel_lab.plotting.runs import import_picture
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.condition_names import Conditions
@@ -181,3 +183,12 @@ def test_a_mass_of_an_angle_is_asked_about(tmp_path: Path) -> None:
     path = file_of(tmp_path, "time (s),signal", READING)
     with pytest.raises(TunnelError, match=r"'mass' is stated, .*; give yaw_inertia, or state --unit m$"):
         read_records([path], ImportChoices(conditions=Conditions(mass=2.0)))
+
+
+def test_the_picture_names_the_input_as_the_campaign_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    labels: list[str] = []
+    monkeypatch.setattr(Axes, "set_ylabel", lambda _, text, **__: labels.append(text))
+    import_picture(read_records([file_of(tmp_path, "time (s),x (mm),force (N)", 1e3 * READING, PUSH)]))
+    assert set(labels) == {"reading [m]", "input force_n"}
