@@ -13,6 +13,7 @@ from diagnosis.findings.other_motions import refused_limit_cycles
 from diagnosis.findings.repeatability import AnswerWithout, RunRepeatability
 from diagnosis.model.joint import recorded, with_law
 from diagnosis.model.nominal import NominalModel
+from diagnosis.model.similar import similar_campaign
 from diagnosis.result import Diagnosis
 from diagnosis.search.clock import Progress
 from diagnosis.search.disturbance import Disturbance
@@ -71,6 +72,11 @@ def diagnose(
         campaign, own = with_law(campaign, joint.law)
     freedom, names = campaign.sensor.freedom, (campaign.name, *(run.id for run in campaign.runs))
     kinds = [kind for kind in (known_effects() if kinds is None else kinds) if kind.possible(freedom)]
+    for kind in (kind for kind in kinds if kind.motion not in ("", freedom.motion)):
+        what = f"is stated with motion = '{kind.motion}', and the campaign has motion = '{freedom.motion}'"
+        raise TunnelError(
+            what, where=f"effect {kind.name}", remedy="state it in the units of the campaign's motion"
+        )
     with freedom.errors(), answering_with(kinds):
         found = _diagnosed(campaign, leave_out, kinds, progress, (joint, own), settings, rivals)
         return freedom.document(found, names).in_words()
@@ -96,8 +102,19 @@ def _diagnosed(
     say = progress or (lambda _: None)
     judged = joint is not None or own is None
     chosen = choose(campaign, kinds, own, judged=judged)
+    if any(kind.motion for kind in chosen.kinds):  # their sizes are the campaign's
+        change = similar_campaign(chosen.campaign, chosen.model)[1].similar
+        chosen = replace(chosen, kinds=tuple(kind.similar(change) for kind in chosen.kinds))
+    with answering_with(chosen.kinds):
+        return _answered(chosen, Question(joint, short, tuple(leave_out), say), progress, settings, rivals)
+
+
+def _answered(
+    chosen: Chosen, asked: Question, progress: Progress | None, settings: Settings, rivals: Sequence[Rival]
+) -> Diagnosis:
+    """The answer from the runs and effects that are chosen."""
+    say = asked.say
     study = _studied(chosen, progress, settings, rivals)
-    asked = Question(joint, short, tuple(leave_out), say)
     say("explained share")
     found, without = Confirmed.of(study), None
     if found.repeats is not None and found.repeats.outlier:

@@ -86,6 +86,7 @@ def prepare(
         model=model,
         similarity=similarity,
         settings=settings,
+        freedom=campaign.sensor.freedom,
         repeatability={} if campaign.repeatability is None else campaign.repeatability.stated,
     )
 

@@ -16,6 +16,7 @@ from diagnosis.model.similarity import AS_MEASURED, Similarity
 from diagnosis.settings import Settings
 from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.campaign import speed_groups
+from tunnel_sim.vocabulary.freedom import ANGLE, Freedom
 
 FOLDS = 3  # groups of runs left out in turn
 
@@ -28,12 +29,14 @@ class Data(PreparedRuns):
         model: nominal model of the campaign; a part of its runs has the same parameters.
         similarity: how the campaign was made from the measured one.
         settings: of the diagnosis.
+        freedom: of the body.
         repeatability: stated relative standard deviations between runs, by what scatters; empty: none is stated.
     """
 
     model: NominalModel
     similarity: Similarity = AS_MEASURED
     settings: Settings = field(default_factory=Settings)
+    freedom: Freedom = ANGLE
     repeatability: Mapping[str, float] = field(default_factory=dict)
 
     @property

@@ -27,6 +27,7 @@ from tunnel_sim.physics.expression import Expression, parse
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.dimensions import Dimension, dimension, dimension_text, product
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.freedom import ANGLE, Freedom
 from tunnel_sim.vocabulary.record import Array
 
 TERM_GAIN: Final = 0.02
@@ -45,6 +46,8 @@ MOST_TERMS: Final = 3
 _NAMES = {"b": "rad", "r": "rad/s", "t": "s", "V": "m/s", "Kr": "N m/rad", "omega": "rad/s", "y": "rad"}
 _INNER = {"w": "rad", "c": "rad", "n": "1", "v": "rad/s", "q": "s", "d": "s", "f": "rad/s"}
 """Inner parameters of terms: widths, places, numbers per radian, rates, times and frequencies."""
+_COUNTED = {"n": "1/rad", "omega": "1/s", "f": "1/s"}
+"""The units of these where the radian is not counted as 1, since a metre stands for it."""
 
 
 @dataclass(frozen=True)
@@ -314,9 +317,10 @@ def predicted_drop(base: Fit, formula: Formula, kind: str) -> float:
 
 def _stated(base: Fit, formula: Formula, kind: str) -> tuple[dict[str, Any], Problem, Point] | None:
     """A formula's table, its problem beside a fit's effects, and the start there; None where it is no effect."""
-    taken = {known.name for known in known_effects()}
-    numbered = (f"proposed_{kind}_{number}" for number in range(2, len(taken) + 3))
-    table = effect_table(formula, next(n for n in chain((f"proposed_{kind}",), numbered) if n not in taken))
+    taken, freedom = {known.name for known in known_effects()}, base.problem.data.freedom
+    first = f"proposed_{freedom.words(kind)}"
+    numbered = (f"{first}_{number}" for number in range(2, len(taken) + 3))
+    table = effect_table(formula, next(n for n in chain((first,), numbered) if n not in taken), freedom)
     try:
         effect = effect_of(table)
     except TunnelError:
@@ -327,15 +331,19 @@ def _stated(base: Fit, formula: Formula, kind: str) -> tuple[dict[str, Any], Pro
     return table, problem, Point(np.concatenate([base.point.common, own]), base.point.per_run)
 
 
-def effect_table(formula: Formula, name: str) -> dict[str, Any]:
-    """A formula in the fit's units as the table of an effects file, with its values."""
+def effect_table(formula: Formula, name: str, freedom: Freedom = ANGLE) -> dict[str, Any]:
+    """A formula in the fit's units as the table of an effects file, with its values; its units are an angle's."""
+    inner_units = _INNER | (_COUNTED if freedom.scales else {})
+    units = {own: freedom.unit(unit) for own, unit in (_NAMES | _INNER | _COUNTED).items()}
+    of_names = {own: dimension(unit) for own, unit in units.items()}
 
     def coefficient(value: float, of: Dimension, over: Dimension, default: float) -> dict[str, object]:
-        unit, bound = dimension_text(product(of, over, -1.0)), _FAR * abs(value)
+        unit, bound = freedom.angle_unit(dimension_text(product(of, over, -1.0))), _FAR * abs(value)
         return {"unit": unit, "scale": value, "lower": -bound, "upper": bound, "default": default}
 
-    first, severity = formula.terms[0].dimension, formula.coefficients[0]
-    aim = dimension("rad" if formula.of_reading else "N m")
+    dimensions = [term.formula.dimension(of_names) for term in formula.terms]
+    first, severity = dimensions[0], formula.coefficients[0]
+    aim = dimension(freedom.unit("rad" if formula.of_reading else "N m"))
     parameters = {"k": coefficient(severity, aim, first, default=0.0)}
     texts = []
     for number, (term, value) in enumerate(zip(formula.terms, formula.coefficients, strict=True), 1):
@@ -344,12 +352,12 @@ def effect_table(formula: Formula, name: str) -> dict[str, Any]:
             text = re.sub(rf"\b{own}\b", f"{own}{number}", text)
             ends = sorted((inner / _NEAR, inner * _NEAR)) if inner else [-1.0, 1.0]
             parameters[f"{own}{number}"] = {
-                "unit": _INNER[own], "scale": inner or ends[1], "lower": ends[0], "upper": ends[1],
+                "unit": inner_units[own], "scale": inner or ends[1], "lower": ends[0], "upper": ends[1],
                 "default": inner,
             }  # fmt: skip
         if number > 1:
             parameters[f"a{number}"] = coefficient(
-                value / severity, first, term.dimension, default=value / severity
+                value / severity, first, dimensions[number - 1], default=value / severity
             )
             text = f"a{number}*{text}"
         texts.append(text)

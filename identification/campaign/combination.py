@@ -118,6 +118,8 @@ def scattering_estimate(linked: LinkedRuns, name: str, fitted: Sequence[FittedRu
         return None
     shown = [item for item in fitted if item.fit is not None and item.estimate.sensor_zero is not None]
     zeros = [item.estimate.sensor_zero for item in shown if item.estimate.sensor_zero is not None]
+    if not zeros:  # a body without a spring has no zero from which its residuals are counted
+        return found
     weights = np.array([one.known_std**-2 for one in zeros])
     mean = float(weights @ np.array([one.value for one in zeros]) / weights.sum())
     common = campaign.sensor.zero != "per_run" and not any(run.unrestrained for run in campaign.runs)

@@ -80,9 +80,11 @@ class Column:
     def units(self) -> list[str]:
         """The units that the user can state for it; none where only the file can state the unit."""
         from tunnel_sim.files.importing.units import UNITS
+        from tunnel_sim.vocabulary.freedom import DISPLACEMENT
 
         kinds = {"time": ("time",), "angle": READINGS}.get(self.role, ())
-        return [unit for kind in kinds for unit in UNITS[kind]]
+        own = DISPLACEMENT.units.values() if self.role == "angle" else ()
+        return [unit for units in (*(UNITS[kind] for kind in kinds), *own) for unit in units]
 
     def stating(self, unit: str | None) -> dict[str, Any]:
         """The choices that state one of its `units`; an unused column is thereby chosen."""
@@ -119,6 +121,7 @@ def _column(
     from tunnel_sim.files.importing.condition_names import condition_of
     from tunnel_sim.files.importing.inputs import stated_input
     from tunnel_sim.files.importing.tables import is_input
+    from tunnel_sim.vocabulary.freedom import column_unit
 
     role: Role
     if any(channel is pair.time.channel for pair in pairs) or (not pairs and is_time(channel)):
@@ -132,8 +135,8 @@ def _column(
         role, stated = "angle", choices.unit if used else None
     if stated is not None:
         return Column(channel.name, stated, "stated here", role, used)
-    if channel.unit:
-        return Column(channel.name, channel.unit, "stated in the file", role, used)
+    if unit := channel.unit or (column_unit(channel.name) if role == "angle" else ""):
+        return Column(channel.name, unit, "stated in the file", role, used)
     if not np.isfinite(channel.values).any():
         return Column(channel.name, "", "it has no numbers", role, used)
     if role == "angle" and (kind := named_kind(channel.name)):

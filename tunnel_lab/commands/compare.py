@@ -50,6 +50,10 @@ def compare(
     if len(documents) < 2:
         raise TunnelError("only one diagnosis", where=shown(documents[0]), remedy="name two files or more")
     diagnoses = [read_diagnosis(path) for path in documents]
+    if other := next((one for one in diagnoses if one.motion != diagnoses[0].motion), None):
+        path, motions = documents[diagnoses.index(other)], (other.motion, diagnoses[0].motion)
+        what = "has motion = '{}', and the first one has '{}'".format(*motions)
+        raise TunnelError(what, where=shown(path), remedy="compare diagnoses of one kind of motion")
     # The campaign's name; the file's where campaigns share a name; if also shared, with a number.
     names, stems = [d.campaign for d in diagnoses], [one_line(path.stem) for path in documents]
     if len(set(names)) < len(names):
@@ -57,7 +61,8 @@ def compare(
     if len(set(names)) < len(names):
         names = [f"{place}: {stem}" for place, stem in enumerate(stems, 1)]
     numbers = chosen.get() in (TableFormat.CSV, TableFormat.JSON)
-    show(table.numbers() if numbers else table.texts() for table in comparisons(names, diagnoses))
+    tables = [table.numbers() if numbers else table.texts() for table in comparisons(names, diagnoses)]
+    show(diagnoses[0].freedom.texts(tables, names))
 
 
 @dataclass(frozen=True)

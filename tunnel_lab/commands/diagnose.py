@@ -264,7 +264,8 @@ def write_proposal(path: Path, answer: Diagnosis) -> Path | None:
     law = None if answer.closable is None else answer.closable.law
     if law is None:
         return None
-    return write_whole(path, tomli_w.dumps({"effects": [as_json(law.effect)]}).encode())
+    document = {**answer.freedom.stated, "effects": [as_json(law.effect)]}
+    return write_whole(path, tomli_w.dumps(document).encode())
 
 
 def diagnose_with_progress(

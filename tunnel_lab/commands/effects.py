@@ -16,6 +16,7 @@ from identification.show.numbers import unit_mark
 from tunnel_lab.terminal.arguments import EffectsFileOption, output_file, refuse_unwritable_files
 from tunnel_lab.terminal.outputs import say, say_written, show
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.freedom import ANGLE, FREEDOMS
 
 if TYPE_CHECKING:
     from tunnel_sim.effects import Effect
@@ -154,7 +155,12 @@ def run(
         )
         for info in kind.parameters()
     )
-    show([TextTable("Parameters", ("name", "symbol", "unit", "meaning", *right), rows, right)])
+    freedom = FREEDOMS[kind.motion or ANGLE.motion]
+    table = TextTable("Parameters", ("name", "symbol", "unit", "meaning", *right), rows, right)
+    show(freedom.texts([table], [kind.name, *(info.name for info in kind.parameters())]))
+    if freedom is not ANGLE:  # the simulator's rig turns
+        say("To look for it: tunnel diagnose CAMPAIGN --effects-file FILE")
+        return
     say(ABOUT_DIRECTIONS)
     say(f"To inject it: tunnel simulate plan.toml --out FOLDER {example(kind)}")
 

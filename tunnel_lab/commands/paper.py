@@ -16,8 +16,11 @@ from tunnel_lab.terminal.outputs import say, say_written, show
 from tunnel_lab.terminal.progress import bar
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, counted, did_you_mean, one_line, shown
+from tunnel_sim.vocabulary.freedom import ANGLE, DISPLACEMENT, Freedom
 
 STIFFNESS, FREQUENCY, SPRING = "stiffness_N_m_per_rad", "frequency_Hz", "spring"
+STIFFNESSES = {STIFFNESS: ANGLE, "stiffness_N_per_m": DISPLACEMENT}
+"""The columns of stiffness, each of springs of another motion."""
 REMEDY = f"give a CSV file with the columns {STIFFNESS} and {FREQUENCY}, and optionally {SPRING}"
 
 
@@ -35,6 +38,7 @@ def springs(
     Izz (kg m²) is the gradient of Kr (N m/rad) against ωn² (rad²/s²) by least
     squares. The residual of a spring is the deviation of its stated stiffness
     from that line. Springs that deviate too far are marked: measure them again.
+    With a column stiffness_N_per_m the line gives the mass of a displacement.
 
     [bold]Examples[/bold]
       tunnel springs
@@ -73,28 +77,36 @@ def show_springs(springs: SpringTable, source: str) -> None:
         numbers = (f"{stiffness:g}", f"{frequency:g}", f"{square:.2f}", f"{residual:+.1f}")
         rows.append((name, *numbers, "off the line" if flag else ""))
     heads = ("spring", "Kr [N m/rad]", "f [Hz]", "ωn² [rad²/s²]", "residual [%]", "remark")
-    show([TextTable(f"Springs of {source}", heads, tuple(rows), heads[1:-1])])
+    own = springs.freedom.words
+    table = TextTable(f"Springs of {source}", heads, tuple(rows), heads[1:-1])
+    show(springs.freedom.texts([table], [source, *springs.names]))
     if fit.inertia.value <= 0.0:
         problem = "stiffness does not rise with frequency, so this table gives no inertia: check it"
-        say(problem, stderr=True)
+        say(own(problem), stderr=True)
         raise typer.Exit(1)
-    say(f"Izz (gradient) = {with_std(fit.inertia.value, fit.inertia.std)} kg m²")
-    say(f"intercept      = {with_std(fit.intercept.value, fit.intercept.std)} N m/rad")
+    say(own(f"Izz (gradient) = {with_std(fit.inertia.value, fit.inertia.std)} kg m²"))
+    say(own(f"intercept      = {with_std(fit.intercept.value, fit.intercept.std)} N m/rad"))
 
 
 @dataclass(frozen=True)
 class SpringTable:
-    """Names of springs, their stiffness Kr (N m/rad) and their wind-off frequency (Hz), both above zero."""
+    """Names of springs, their stiffness Kr (N m/rad) and their wind-off frequency (Hz), both above zero.
+
+    Args:
+        freedom: of the body on them.
+    """
 
     names: tuple[str, ...]
     stiffness: tuple[float, ...]
     frequency_hz: tuple[float, ...]
+    freedom: Freedom = ANGLE
 
 
 def read_spring_table(path: Path) -> SpringTable:
     """Read a spring table in CSV; lines starting with ``#`` are comments.
 
-    Columns are ``stiffness_N_m_per_rad`` (N m/rad), ``frequency_Hz`` (Hz) and, optionally, ``spring``, its name.
+    Columns are ``stiffness_N_m_per_rad`` (N m/rad) or ``stiffness_N_per_m`` (N/m), ``frequency_Hz`` (Hz) and,
+    optionally, ``spring``, its name.
 
     Raises:
         TunnelError: when the file cannot be read or is too large, a column is missing or unknown, a value is not a
@@ -117,12 +129,14 @@ def read_spring_table(path: Path) -> SpringTable:
             raise TunnelError(f"is not a line of CSV ({error})", where=where, remedy=REMEDY) from None
     if not rows:
         raise TunnelError("is empty", where=str(path), remedy=REMEDY)
-    header, known = [name.strip() for name in rows[0][1]], (SPRING, STIFFNESS, FREQUENCY)
+    header = [name.strip() for name in rows[0][1]]
+    of_motion = next((name for name in STIFFNESSES if name in header), STIFFNESS)
+    known = (SPRING, of_motion, FREQUENCY)
     for name in header:
         if name not in known:
             what = f"unknown column '{one_line(name, 40)}'"
             raise TunnelError(what, where=str(path), remedy=did_you_mean(name, known))
-    for name in (STIFFNESS, FREQUENCY):
+    for name in (of_motion, FREQUENCY):
         if header.count(name) != 1:
             raise TunnelError(f"needs one column {name}", where=str(path), remedy=REMEDY)
     columns = {name: header.index(name) for name in known if name in header}
@@ -137,13 +151,13 @@ def read_spring_table(path: Path) -> SpringTable:
             what = f"the spring's name has {len(name)} characters"
             raise TunnelError(what, where=where, remedy=f"give it {limits.NAME_CHARACTERS} at most")
         names.append(name or str(number))
-        stiffness.append(_positive(row[columns[STIFFNESS]], where))
+        stiffness.append(_positive(row[columns[of_motion]], where))
         frequency.append(_positive(row[columns[FREQUENCY]], where))
     if len(names) < 3:
         raise TunnelError(
             f"has {counted(len(names), 'spring')}", where=str(path), remedy="give three or more"
         )
-    return SpringTable(tuple(names), tuple(stiffness), tuple(frequency))
+    return SpringTable(tuple(names), tuple(stiffness), tuple(frequency), STIFFNESSES[of_motion])
 
 
 def _positive(text: str, where: str) -> float:

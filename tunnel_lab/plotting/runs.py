@@ -294,7 +294,7 @@ def import_picture(imported: Imported) -> bytes:
             if part.piece.stopped:
                 axes.axvline(time[part.piece.last - 1], color=VERMILION, linewidth=0.8, linestyle=":")
         if raw.input is not None:
-            name, values = raw.input.role, raw.input.values
+            name, values = raw.sensor.freedom.own_input(raw.input.role), raw.input.values
             beside = axes.twinx()
             beside.plot(*thinned(time, values), color=VERMILION, linewidth=0.4, alpha=0.6)
             beside.set_ylabel(f"input {name}", fontsize=8, color=VERMILION)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import keyword
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, make_dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -13,17 +13,18 @@ import numpy as np
 
 from tunnel_sim.effects.base import Drawn, Effect
 from tunnel_sim.effects.capabilities import ReadingEffect
-from tunnel_sim.effects.parameters import Circumstances, Trial, moment_scale, parameter
+from tunnel_sim.effects.parameters import Circumstances, ParameterInfo, Trial, moment_scale, parameter
 from tunnel_sim.effects.traits import Channel, Condition
 from tunnel_sim.physics.expression import FUNCTIONS, Expression, parse
 from tunnel_sim.physics.run_settings import RunSettings, SettingsTable
 from tunnel_sim.vocabulary.dimensions import dimension, in_si
 from tunnel_sim.vocabulary.errors import TunnelError, shown
+from tunnel_sim.vocabulary.freedom import FREEDOMS, Motion
 from tunnel_sim.vocabulary.record import Array
 
 #: Variables of a run: unit, and operation of the moment law.
 _INPUTS = {"b": ("rad", "angle"), "r": ("rad/s", "rate"), "t": ("s", "time"), "V": ("m/s", "speed")}
-_OF_RUN = {"Kr": "N m/rad", "omega": "rad/s"}
+_OF_RUN = {"Kr": "N m/rad", "omega": "1/s"}
 _MOMENT = frozenset({*_INPUTS, *_OF_RUN})
 _READING = frozenset({"y", "t", "V", *_OF_RUN})
 _UNITS = {name: unit for name, (unit, _) in _INPUTS.items()} | _OF_RUN | {"y": "rad"}
@@ -56,6 +57,17 @@ class ExpressionEffect(Effect):
 
     formula: ClassVar[Expression]
     tries = 2
+
+    @classmethod
+    def similar(cls, change: Callable[[float, str], float]) -> type[Self]:
+        """The effect with the sizes of the similar campaign, where those of the file are the campaign's own."""
+        if not cls.motion:
+            return cls
+        sizes = {info.name: [change(size, info.unit) for size in _sizes(info)] for info in cls.parameters()}
+        fields = [_field(info.name, info.unit, info.meaning, sizes[info.name]) for info in cls.parameters()]
+        (first, *_), *others = sizes.values()
+        seen = {"example": (first, *(default for *_, default in others))}
+        return make_dataclass(cls.__name__, fields, bases=(cls,), namespace=seen, frozen=True)
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
@@ -124,6 +136,7 @@ def expression_effect(
     moment: str | None = None,
     reading: str | None = None,
     summary: str = "",
+    motion: Motion | None = None,
 ) -> type[Effect]:
     """An effect whose moment or reading is an expression; the class is not registered.
 
@@ -136,7 +149,11 @@ def expression_effect(
             (m/s), the stated stiffness ``Kr`` (N m/rad), ``omega`` = √(Kr/Izz) (rad/s) and the parameters.
         reading: rad; a function of ``y`` (rad), the reading without the effect, of ``t``, ``V``, ``Kr`` and
             ``omega`` as above and of the parameters.
+        motion: which the effect is of; of a displacement, ``b``, ``r``, ``y`` and ``Kr`` are in m, m/s, m and N/m,
+            a moment in N, and the parameters in units of these. With it the sizes of parameters are those of the
+            campaign that is diagnosed, and without it those of a rig of 2 Hz and 16 N m/rad. None: an angle.
     """
+    freedom = FREEDOMS[motion or "angle"]
     text = moment if reading is None else reading
     if text is None or (moment is not None and reading is not None):
         raise TunnelError("does not state exactly one of moment and reading", remedy="state one of them")
@@ -145,8 +162,10 @@ def expression_effect(
                           remedy="use sensor for a reading, and another channel for a moment")  # fmt: skip
     _check_names(parameters)
     formula = parse(text, frozenset(parameters) | (_MOMENT if reading is None else _READING))
-    expected = "N m" if reading is None else "rad"
-    units = _UNITS | {symbol: quantity.unit for symbol, quantity in parameters.items()}
+    expected = freedom.unit("N m" if reading is None else "rad")
+    units = {symbol: freedom.unit(unit) for symbol, unit in _UNITS.items()} | {
+        symbol: quantity.unit for symbol, quantity in parameters.items()
+    }
     found = formula.dimension({symbol: dimension(unit) for symbol, unit in units.items()})
     if found != dimension(expected):
         what = f"{text!r} is in {in_si(found)}, not in {expected} ({in_si(dimension(expected))})"
@@ -174,12 +193,9 @@ def expression_effect(
         raise TunnelError(f"{formula.text!r} is not {null} at {severity} = 0", remedy=remedy)
     if np.all(np.abs(beyond - without) <= 1e-300):
         raise TunnelError(f"{formula.text!r} does nothing", remedy="correct the expression or the scale")
-    fields = []
-    for symbol, q in parameters.items():
-        field = parameter(
-            symbol, q.unit, q.meaning, scale=q.scale, lower=q.lower, upper=q.upper, default=q.default
-        )
-        fields.append((symbol, float, field))
+    fields = [
+        _field(symbol, freedom.angle_unit(q.unit), q.meaning, _sizes(q)) for symbol, q in parameters.items()
+    ]
     first, *others = parameters.values()
     namespace: dict[str, Any] = {
         "name": name,
@@ -191,10 +207,23 @@ def expression_effect(
         "example": (first.scale, *(q.default for q in others)),
         "autonomous": "t" not in formula.names,
         "formula": formula,
+        "motion": "" if motion is None else motion,
         "__doc__": summary or "An effect by expression.",
     }
     base = _Moment if reading is None else _Reading
     return make_dataclass(name, fields, bases=(base,), namespace=namespace, frozen=True)
+
+
+def _sizes(of: ExpressionParameter | ParameterInfo) -> tuple[float, float, float, float]:
+    """Typical value, bounds and default of a parameter, in its unit."""
+    return of.scale, of.lower, of.upper, of.default
+
+
+def _field(symbol: str, unit: str, meaning: str, sizes: Iterable[float]) -> tuple[str, type, Any]:
+    """A field of an effect's class, with the sizes of `_sizes`."""
+    scale, lower, upper, default = sizes
+    described = parameter(symbol, unit, meaning, scale=scale, lower=lower, upper=upper, default=default)
+    return symbol, float, described
 
 
 def _check_names(parameters: Mapping[str, ExpressionParameter]) -> None:
@@ -225,7 +254,8 @@ def read_effects(path: Path) -> tuple[type[Effect], ...]:
     from tunnel_sim.files.toml_input import load_toml, validate
 
     missing = "name an effects file; docs/how-to/add-an-effect.md has an example"
-    tables = validate(EffectsDocument, load_toml(path, missing=missing), path).effects
+    document = validate(EffectsDocument, load_toml(path, missing=missing), path)
+    tables = document.effects
     names = [table.name for table in tables]
     effects = []
     for table in tables:
@@ -243,6 +273,7 @@ def read_effects(path: Path) -> tuple[type[Effect], ...]:
             stated = {
                 key: getattr(table, key) for key in ("channel", "condition", "moment", "reading", "summary")
             }
+            stated["motion"] = document.motion
             effects.append(expression_effect(table.name, parameters=quantities, **stated))
         except TunnelError as error:
             raise TunnelError(error.what, where=where, remedy=error.remedy) from error

@@ -7,7 +7,7 @@ import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Literal, TypeAlias
+from typing import ClassVar, Literal, Self, TypeAlias
 
 from tunnel_sim.effects.parameters import (
     DESCRIPTION,
@@ -43,6 +43,7 @@ class Traits:
     - ``driven``: whether it acts on driven runs only.
     - ``by_angle_in_room``: whether its moment depends on the body's angle in the room, or on a second inertia:
       neither is included where a base turns with a known acceleration.
+    - ``motion``: the only one that it acts on, in whose units the campaign's own sizes state it; empty: any.
     - ``jumps``: whether its law jumps or has a kink, as dry friction where the rate changes its sign: an
       integration step across it is less accurate, and the tests allow for this.
     - ``turns``: the parameter that changes its sign if angles are counted from half a turn away; empty: none.
@@ -71,6 +72,7 @@ class Traits:
     on_spring: ClassVar[bool] = False
     driven: ClassVar[bool] = False
     by_angle_in_room: ClassVar[bool] = False
+    motion: ClassVar[str] = ""
     jumps: ClassVar[bool] = False
     turns: ClassVar[str] = ""
     tries: ClassVar[int] = 1
@@ -127,6 +129,16 @@ class Traits:
     def possible(cls, freedom: Freedom) -> bool:
         """Whether a body with that freedom can have it: by the air, or by the angle in the room, only some can."""
         return (freedom.windy or cls.condition == "always") and (freedom.turns or not cls.by_angle_in_room)
+
+    @classmethod
+    def similar(cls, change: Callable[[float, str], float]) -> type[Self]:
+        """The effect of a similar campaign; the sizes of a typical effect are a rig's.
+
+        Args:
+            change: from a value and its unit to the value in the similar campaign.
+        """
+        del change
+        return cls
 
     @property
     def severity(self) -> float:

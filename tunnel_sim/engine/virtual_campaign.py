@@ -24,6 +24,7 @@ from tunnel_sim.vocabulary.between_runs import along, between_runs, together
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties, mean_wind_speed
 from tunnel_sim.vocabulary.dimensions import beside
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.freedom import ANGLE
 from tunnel_sim.vocabulary.plan import AeroDerivatives, CampaignPlan, Condition, SensorModel, Truth
 from tunnel_sim.vocabulary.record import Record
 from tunnel_sim.vocabulary.rig import Rig
@@ -197,6 +198,9 @@ def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
     drives = [condition.drive for condition in plan.conditions if condition.drive is not None]
     for effect in effects:
         where = f"effect {effect.name}"
+        if effect.motion not in ("", ANGLE.motion):
+            what = f"is stated with motion = '{effect.motion}', and the simulated rig turns"
+            raise TunnelError(what, where=where, remedy="state it in the units of an angle")
         if isinstance(effect, BetweenRuns) and effect.scatters in plan.scatter.stated:
             what = f"{effect.scatters} scatters twice, by this effect and in [scatter]"
             raise TunnelError(what, where=where, remedy="give one of them")

@@ -32,6 +32,7 @@ from tunnel_sim.files.toml_input import (
 )
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.freedom import Motion
 from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.plan import (
     DEFAULT_SAMPLE_RATE,
@@ -324,6 +325,7 @@ class OwnEffectTable(StrictModel):
 class EffectsDocument(StrictModel):
     """The whole of an effects file."""
 
+    motion: Motion | None = optional("'angle' or 'displacement'")
     effects: Annotated[list[OwnEffectTable], Field(min_length=1, max_length=limits.OWN_EFFECTS)] = Field(
         description="tables [[effects]]"
     )

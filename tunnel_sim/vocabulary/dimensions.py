@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import re
+from collections.abc import Mapping
 from typing import TypeAlias
 
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -93,11 +94,15 @@ def _factors(text: str, sign: float) -> Dimension | None:
 
 def in_si(given: Dimension) -> str:
     """The unit of a dimension in kg, m and s, such as ``kg m2/s2``; ``1`` for a number."""
-    named = list(zip(("kg", "m", "s"), given, strict=True))
+    return unit_text(dict(zip(("kg", "m", "s"), given, strict=True)))
+
+
+def unit_text(powers: Mapping[str, float]) -> str:
+    """The unit of powers of units, such as ``N m/rad2``; ``1`` for a number."""
     above, below = (
         [
             f"{name}{f'{sign * power:g}' if abs(power) != 1.0 else ''}"
-            for name, power in named
+            for name, power in powers.items()
             if sign * power > 0.0
         ]
         for sign in (1.0, -1.0)

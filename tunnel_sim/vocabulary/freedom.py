@@ -18,8 +18,9 @@ from functools import cache
 from math import pi
 from typing import Any, Literal, TypeVar, cast
 
-from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.input_kinds import INPUTS, InputColumn
+from tunnel_sim.vocabulary.dimensions import dimension, unit_text
+from tunnel_sim.vocabulary.errors import TunnelError, one_of
+from tunnel_sim.vocabulary.input_kinds import INPUTS, InputColumn, InputKind
 
 Motion = Literal["angle", "displacement"]
 """What a sensor measures, or the derivatives of what: the angle or the displacement of the body."""
@@ -37,8 +38,11 @@ class Freedom:
     Args:
         columns: of a run file that may hold the reading, with factors to SI, by quantity; the first is written.
         inputs: columns of a run file that may hold an input, with the column of that kind of input for an angle.
+        input_units: of inputs in files of instruments, with their factors to SI, by the column for an angle; those
+            of an angle are among the traits of each kind.
         keys: keys of ``campaign.toml`` that have another name, with the name for an angle.
         refused: keys of ``campaign.toml`` that the freedom does not have.
+        condition_units: of these keys in files of instruments, with the unit for an angle and the factor to it.
         units: of readings in files of instruments, with their factors to SI, by quantity; those of an angle are
             among the units of all columns.
         shown: by SI unit of a reading, the mark of the unit in which it is shown, and the factor.
@@ -51,8 +55,10 @@ class Freedom:
     motion: Motion
     columns: Mapping[str, Mapping[str, float]]
     inputs: Mapping[str, InputColumn]
+    input_units: Mapping[InputColumn, Mapping[str, float]] = field(default_factory=dict)
     keys: Mapping[str, str] = field(default_factory=dict)
     refused: tuple[str, ...] = ()
+    condition_units: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     units: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     shown: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     turns: bool = True
@@ -69,6 +75,23 @@ class Freedom:
             unit = re.sub(old, new, unit)
         return unit
 
+    def angle_unit(self, unit: str) -> str:
+        """The unit for an angle of a quantity that has some unit here, such as ``N m/rad`` for ``N/m``."""
+        if not self._units:
+            return unit
+        kg, metres, seconds = dimension(unit)
+        return unit_text({"N": kg, "m": kg, "s": seconds + 2.0 * kg, "rad": metres - kg})
+
+    @property
+    def scales(self) -> bool:
+        """Whether the motion may be computed at another size, so that every power of its unit counts."""
+        return not self.turns
+
+    @property
+    def stated(self) -> dict[str, str]:
+        """Its statement in a document or a file; an angle goes unsaid."""
+        return {"motion": self.motion} if self._units else {}
+
     def scale(self, size: float) -> float:
         """The factor with which a motion is computed; a power of two, so that it changes no digit.
 
@@ -78,7 +101,7 @@ class Freedom:
             size: the greatest motion, in SI.
         """
         low, high = _SWING
-        if self.turns or not size > 0.0 or low <= size <= high:
+        if not self.scales or not size > 0.0 or low <= size <= high:
             return 1.0
         power = 0
         while size * 2.0**power < _USUAL_SWING / 2.0**0.5:
@@ -101,7 +124,7 @@ class Freedom:
         if name in _KEPT:
             return value
         if isinstance(value, str):
-            if name == "unit":
+            if "unit" in (name, owner):
                 return "1/s" if owner in _FREQUENCIES else self.unit(value)
             return self.words(value, names) if name in _SENTENCES else value
         if isinstance(value, Mapping):
@@ -165,19 +188,25 @@ class Freedom:
         except TunnelError as error:
             if not self._words:
                 raise
-            own = TunnelError(
-                self.words(error.what),
-                where=error.where,
-                remedy=self.words(error.remedy),
-                options=error.options,
-                parts=error.parts,
-            )
-            raise own from error
+            raise self.refusal(error) from error
+
+    def refusal(self, error: TunnelError, names: Collection[str] = ()) -> TunnelError:
+        """A refusal in the freedom's own words; names as in `words`."""
+        return TunnelError(
+            self.words(error.what, names),
+            where=error.where,
+            remedy=self.words(error.remedy, names),
+            options=error.options,
+            parts=[self.refusal(part, names) for part in error.parts],
+        )
 
     # ---- files
 
-    def as_angle(self, table: Mapping[str, Any], where: str) -> dict[str, Any]:
+    def as_angle(self, table: Mapping[str, Any], where: str, *, imported: bool = False) -> dict[str, Any]:
         """A table of ``campaign.toml`` under the keys of an angle.
+
+        Args:
+            imported: whether it is about the files of an import, whose units state the motion.
 
         Raises:
             TunnelError: for a key that the freedom does not have.
@@ -192,7 +221,9 @@ class Freedom:
                 wrong, right, motion = (key, own, ANGLE) if other is self else (own, key, other)
                 if table.get(wrong) is not None:
                     what = f"'{wrong}' is stated, but not motion = '{motion.motion}'"
-                    remedy = f"give {right}, or state motion = '{motion.motion}' under [sensor]"
+                    unit = "rad" if motion.turns else "m"
+                    stated = f"--unit {unit}" if imported else f"motion = '{motion.motion}' under [sensor]"
+                    remedy = f"give {right}, or state {stated}"
                     raise TunnelError(what, where=where, remedy=remedy)
         return {self.keys.get(key, key): value for key, value in table.items()}
 
@@ -205,9 +236,49 @@ class Freedom:
         """Keys of ``campaign.toml`` under the freedom's names, without those that it does not have."""
         return tuple(self.as_own(dict.fromkeys(key for key in keys if key not in self.refused)))
 
+    def condition(self, name: str, unit: str) -> tuple[str, str, float]:
+        """Name and unit of a condition in a file of an instrument, as for an angle, and the factor to that unit."""
+        plain = re.split(r"\s*[(\[{<]", name.strip())[0]
+        return self.keys.get(plain, name), *self.condition_units.get(unit, (unit, 1.0))
+
     def own_input(self, column: str) -> str:
         """The column of an input in a run file, for the column of its kind."""
         return next(name for name, kind in self.inputs.items() if kind == column)
+
+    def stated_input(self, column: str, where: str) -> InputColumn:
+        """The column for an angle of a kind of input that is stated under the freedom's own name.
+
+        Raises:
+            TunnelError: for the name of an input of another freedom.
+        """
+        if column not in self.inputs:
+            what = f"'{column}' is not an input of a motion = '{self.motion}'"
+            raise TunnelError(what, where=where, remedy=f"give {one_of(tuple(self.inputs))}")
+        return self.inputs[column]
+
+    def input_kind(self, name: str, unit: str) -> InputKind | None:
+        """The kind of input shown by name and unit of a column in an instrument's file; None: neither shows it."""
+        name = self.inputs.get(name.strip().lower(), name) if self.input_units else name
+        if self.input_units and unit not in ("", "counts"):
+            held = (INPUTS[column].unit for column, units in self.input_units.items() if unit in units)
+            unit = next(held, "unknown")
+        return next(
+            (kind for kind in map(INPUTS.__getitem__, self.inputs.values()) if kind.holds(name, unit)), None
+        )
+
+    def input_factor(self, kind: InputKind, unit: str) -> float:
+        """From a unit of a file to the unit of a kind of input; 1 for an unknown unit."""
+        if not self.input_units:
+            return kind.factor(unit)
+        return self.input_units.get(kind.column, {}).get(unit, 1.0)
+
+    def input_unit(self, name: str, unit: str) -> str:
+        """The unit of an input's column as `input_units` spells it: the stated one, or the one in its name."""
+        if not self.input_units:
+            return unit
+        found = _OWN_UNIT.search(name)
+        plain = (unit or (found[1].replace("_", "/") if found else "")).translate(_PLAIN)
+        return "kN" if plain == "kn" else plain  # a knot measures wind only
 
 
 _CONSTANT = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?) rad\b")
@@ -249,6 +320,8 @@ ANGLE = Freedom(
 )  # fmt: skip
 """The yaw angle of a body in a tunnel, or the angle of a joint."""
 
+_LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
+_ACCELERATIONS = {"m/s2": 1.0, "cm/s2": 1e-2, "mm/s2": 1e-3, "g": _G, "mg": 1e-3 * _G}
 _NOUN = r"\b(the|a|its|of|by|small|large|smaller|larger|free|wide|whole|first|each|every|per|own|\d+)( )"
 DISPLACEMENT = Freedom(
     "displacement",
@@ -261,12 +334,20 @@ DISPLACEMENT = Freedom(
         "force_n": "moment_nm", "drive": "drive", "base_m": "base_rad", "command_m": "command_rad",
         "base_acceleration_m_s2": "base_acceleration_rad_s2",
     },
+    input_units={
+        "moment_nm": {"N": 1.0, "mN": 1e-3, "cN": 1e-2, "kN": 1e3},
+        "base_rad": _LENGTHS, "command_rad": _LENGTHS, "base_acceleration_rad_s2": _ACCELERATIONS,
+    },
     keys={"mass": "yaw_inertia", "release_displacement": "release_angle"},
+    condition_units={
+        "N/m": ("N m/rad", 1.0), "N/mm": ("N m/rad", 1e3), "kN/m": ("N m/rad", 1e3),
+        "kg": ("kg m2", 1.0), "g": ("kg m2", 1e-3), **{unit: ("rad", size) for unit, size in _LENGTHS.items()},
+    },
     refused=("wind_speed", "air_density", "frontal_area", "reference_length", "width"),
     units={
-        "angle": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6},
+        "angle": _LENGTHS,
         "rate": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3},
-        "acceleration": {"m/s2": 1.0, "cm/s2": 1e-2, "mm/s2": 1e-3, "g": _G, "mg": 1e-3 * _G},
+        "acceleration": _ACCELERATIONS,
     },
     shown={"m": ("mm", 1e3), "m/s": ("mm/s", 1e3), "m/s2": ("m/s²", 1.0)},
     turns=False,
@@ -294,6 +375,7 @@ DISPLACEMENT = Freedom(
         (r"bearing and the potentiometer", "guide and the sensor"),
         (r"(natural frequency of small )swings( \[)rad/s", r"\1motions\g<2>1/s"),
         (r"(ωn\s*\[)rad/s", r"\g<1>1/s"),
+        (r"(ωn²\s*\[)rad²/s²", r"\g<1>1/s²"),
         (r"with other springs, wind speeds and release angles", "with other springs and release displacements"),
         (r"needed for Izz, Cr, Cnβ and Cnr", "needed for the mass and the damping"),
         # clauses about the air
@@ -337,7 +419,7 @@ DISPLACEMENT = Freedom(
         (r"\b([Aa])n angular\b", r"\1n"),
         (r"\b[Aa]ngular (acceleration|rate|velocity)", r"\1"),
         (r"\b([Aa])n angle\b", r"\1 displacement"),
-        (r"(?<!')\b[Aa]ngle(s?)\b", r"displacement\1"),
+        (r"(?<!')(?<!--)\b[Aa]ngle(s?)\b", r"displacement\1"),
         (r"\b([Aa])n inertia\b", r"\1 mass"),
         (r"\b[Ii]nertias\b", "masses"),
         (r"\b[Ii]nertia\b", "mass"),
@@ -348,7 +430,7 @@ DISPLACEMENT = Freedom(
         (r"\b[Ss]wing(s?)\b", r"move\1"),
         # symbols
         (r"\bIzz\b", "m"),
-        (r"\bKr\b", "k"),
+        (r"\bKr\b(?!\*)", "k"),  # a formula has names of its own
         (r"\bCr\b", "c"),
         ("β\u0308", "x\u0308"),
         ("β\u0307", "x\u0307"),
@@ -361,14 +443,23 @@ DISPLACEMENT = Freedom(
 FREEDOMS: Mapping[str, Freedom] = {one.motion: one for one in (ANGLE, DISPLACEMENT)}
 """By their motion."""
 
+OwnInputColumn = Literal[InputColumn, "force_n", "base_m", "command_m"]
+"""The columns of a run file that may hold its input, of any freedom."""
+
+OWN_INPUT_COLUMNS = tuple(dict.fromkeys(name for one in FREEDOMS.values() for name in one.inputs))
+"""All of them."""
+
 
 def column_unit(name: str) -> str:
-    """The unit in the name of a column of a displacement, as the format writes it, such as ``mm``; empty: none."""
+    """The unit in the name of a displacement's column, of the format or such as ``pos_mm``; empty: none."""
     known = (column for columns in DISPLACEMENT.columns.values() for column in columns)
-    if name not in known:
-        return ""
-    length, *per = name.removeprefix("x_").split("_")
-    return "/".join([length, *per])
+    found = (_OWN_UNIT if name in known else _PLAIN_UNIT).search(name)
+    return found[1].replace("_", "/") if found else ""
+
+
+def freedom_of_column(name: str, unit: str) -> Freedom:
+    """The freedom of a reading, by the name of its column and its unit there, which may be empty."""
+    return ANGLE if linear_unit(unit or column_unit(name)) is None else DISPLACEMENT
 
 
 def linear_unit(text: str) -> tuple[str, str, float] | None:
@@ -381,6 +472,8 @@ def linear_unit(text: str) -> tuple[str, str, float] | None:
 
 
 _PLAIN = str.maketrans({"²": "2", "^": None, "µ": "u", "μ": "u", "*": None})
+_PLAIN_UNIT = re.compile(r"(?<=[_\s])((?:mm|[cuµ]m)(?:[_/]s[2²]?)?|m[_/]s[2²])$")
+_OWN_UNIT = re.compile(r"(?<=[_\s])((?:[mcuµ]?m)(?:[_/]s[2²]?)?|g|mg|[mck]?N)$")
 
 
 def freedom_of_unit(unit: str) -> Freedom:

@@ -9,8 +9,10 @@ import json
 import re
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
+import jsonschema
 import numpy as np
 import pytest
 
@@ -21,6 +23,7 @@ from diagnosis.result import Diagnosis
 from identification import identify
 from identification.show.blocks import as_html
 from tests.support.linear import FORBIDDEN, Force, linear_campaign, no_force
+from tunnel_lab.commands.about import schema_of
 from tunnel_lab.report import render_report
 from tunnel_sim.effects.registry import known_effects
 from tunnel_sim.vocabulary.campaign import Campaign, Quantity
@@ -44,6 +47,7 @@ def square(x: float, v: float, k: float) -> float:
     return -0.5 * abs(v) * v
 
 
+ROOT = Path(__file__).parents[3]
 CASES: dict[str, tuple[Campaign, str | None, float]] = {}
 """Campaign, cause (None: no gap), and the true value of its first parameter."""
 
@@ -144,6 +148,41 @@ def test_it_is_read_back(case: tuple[Diagnosis, Campaign, str | None, float]) ->
     again = Diagnosis.from_json_dict(json.loads(json.dumps(answer.to_json_dict())))
     assert again.to_json_dict() == answer.to_json_dict()
     assert str(again) == str(answer)
+
+
+OF_ANGLE = re.compile(r"rad(?![a-z])|deg(?![a-z])|angle|yaw|inertia|moment(?!s$)|_nm")
+"""What the names of an angle's fields contain."""
+
+
+def test_the_schema_and_the_page_describe_its_names(
+    case: tuple[Diagnosis, Campaign, str | None, float],
+) -> None:
+    """The names are an angle's, so that one schema serves; the page has a rule for each."""
+    answer, campaign, *_ = case
+    page = (ROOT / "docs/reference/diagnosis.md").read_text(encoding="utf-8")
+    page = page.partition("## A displacement")[2].partition("\n## ")[0]
+    ruled = set(re.findall(r"`…?(\w+)`", page))
+    for name, document in (
+        ("diagnosis", answer.to_json_dict()),
+        ("estimate", identify(campaign).to_json_dict()),
+    ):
+        document = json.loads(json.dumps(document))
+        jsonschema.Draft202012Validator(schema_of(name)).validate(document)
+        assert document["motion"] == "displacement"
+        document.pop("seconds", None)
+        for key in {one for one in _keys(document) if OF_ANGLE.search(one)}:
+            described = (
+                key in ruled or re.search(r"_rad(_s)?$", key) or re.fullmatch(r"\w+_std|moment\w*", key)
+            )
+            assert described, key
+
+
+def _keys(document: Any) -> Iterator[str]:
+    if isinstance(document, dict):
+        yield from document
+    for value in document.values() if isinstance(document, dict) else document:
+        if isinstance(value, dict | list):
+            yield from _keys(value)
 
 
 def numbers(document: Any, place: str = "") -> Iterator[tuple[str, float]]:

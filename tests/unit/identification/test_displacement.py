@@ -7,11 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from identification import identify
 from tests.support.linear import FORBIDDEN, linear_campaign
-from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.record import Record
 
 
@@ -61,3 +63,27 @@ def test_a_displacement_does_not_wrap(cart: Campaign) -> None:
     assert any("whole turns" in one for one in said)
     said = [str(remark) for remark in identify(turned, throw=False).remarks]
     assert not any("turn" in one for one in said)
+
+
+def test_a_pushed_cart_without_a_spring_whose_runs_differ() -> None:
+    """Dry friction, which the model lacks, differs from run to run as damping; there is no zero to be fitted."""
+    time, rng, runs = np.arange(4000) / 100.0, np.random.default_rng(5), []
+    for peak, phase in ((3.0, 1.0), (1.5, 2.0)):
+        push = peak * (np.sin(2.0 * np.pi * (0.1 + 0.01 * time) * time) + 0.3 * np.sin(5.1 * time + phase))
+
+        def slope(t: float, state: np.ndarray, push: np.ndarray = push) -> list[float]:
+            v = state[1]
+            return [v, (float(np.interp(t, time, push)) - 1.5 * v - 0.05 * np.tanh(v / 1e-3)) / 2.0]
+
+        ends = (0.0, float(time[-1]))
+        moved = solve_ivp(slope, ends, [0.0, 0.0], t_eval=time, rtol=1e-8, atol=1e-10, max_step=0.02).y[0]
+        record = Record(time, moved + 5e-5 * rng.standard_normal(time.size))
+        drive = Input("moment_nm", push, "linear")
+        runs.append(Run(f"r{len(runs)}", record, 0.0, spring_stiffness=0.0, drive=drive))
+    sensor = SensorProperties(motion="displacement")
+    for given in (sensor, SensorProperties()):
+        found = identify(Campaign("cart", RigProperties(yaw_inertia=2.0), given, tuple(runs)), throw=False)
+        assert found.yaw_inertia is not None
+        assert found.yaw_inertia.value == pytest.approx(2.0, rel=0.05)
+        assert found.sensor_zero is None
+        assert found.repeatability is not None

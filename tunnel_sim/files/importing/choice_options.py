@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from tunnel_sim.vocabulary.errors import one_of
-from tunnel_sim.vocabulary.input_kinds import INPUT_COLUMNS
+from tunnel_sim.vocabulary.freedom import OWN_INPUT_COLUMNS
 
 
 @dataclass(frozen=True)
@@ -60,8 +60,8 @@ CHOICES: Mapping[str, ChoiceOption] = {
     ),
     "input_as": ChoiceOption(
         "Columns",
-        one_of([f"'{name}'" for name in INPUT_COLUMNS]),
-        f"What the input is: {one_of(INPUT_COLUMNS)}.",
+        one_of([f"'{name}'" for name in OWN_INPUT_COLUMNS]),
+        f"What the input is: {one_of(OWN_INPUT_COLUMNS)}.",
         "COLUMN",
     ),
     "input_hold": ChoiceOption(

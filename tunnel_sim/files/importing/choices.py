@@ -25,7 +25,7 @@ from tunnel_sim.files.toml_input import (
     validate,
 )
 from tunnel_sim.vocabulary.errors import TunnelError, one_line
-from tunnel_sim.vocabulary.input_kinds import InputColumn
+from tunnel_sim.vocabulary.freedom import OwnInputColumn
 from tunnel_sim.vocabulary.inputs import Hold
 
 
@@ -75,7 +75,7 @@ class ImportChoices(StrictModel):
     )
     rest: float | None = _choice("rest")
     input: OneLine | None = _choice("input")
-    input_as: InputColumn | None = _choice("input_as")
+    input_as: OwnInputColumn | None = _choice("input_as")
     input_hold: Hold | None = _choice("input_hold")
     leave_out: tuple[OneLine, ...] = Field(
         default=(), strict=False, title="Leave out", description="a list of names of runs or files"

@@ -41,7 +41,7 @@ from tunnel_sim.files.importing.remarks import doubt
 from tunnel_sim.files.importing.tables import NO_CHANNEL, Channel, RunColumn, Table, is_input
 from tunnel_sim.files.importing.units import claims, kind_of
 from tunnel_sim.vocabulary.errors import TunnelError, asking, attempt, did_you_mean, joined, one_line
-from tunnel_sim.vocabulary.freedom import column_unit, linear_unit
+from tunnel_sim.vocabulary.freedom import DISPLACEMENT, FREEDOMS, column_unit, freedom_of_column, linear_unit
 from tunnel_sim.vocabulary.input_kinds import without_command
 
 _HEAD = 20_000  # samples of a column without a name that are inspected
@@ -50,6 +50,9 @@ _JUDGED = 200_000  # samples of a column that is not used, for its effect on the
 _MOST_JUDGED = 8  # columns
 _LEAST_JUDGED = 16  # samples
 _UNNAMED = 4  # of the levels of `_likeliest`: neither name nor unit is an angle's
+_LINEAR = range(
+    7, 11
+)  # of these levels: the unit is a displacement's, its rate's or its acceleration's, a base's
 _HARDLY = 0.02  # of the span of another column in the same unit
 _DERIVATIVE = 0.9  # correlation with the derivative of another column, from which a column is its rate
 
@@ -81,9 +84,9 @@ class Unread(TunnelError):
     """Open questions about the columns of a run: units, a rate, or which of several is meant."""
 
     def __init__(self, fault: TunnelError, columns: RunColumns) -> None:
-        super().__init__(
-            fault.what, where=fault.where, remedy=fault.remedy, options=fault.options, parts=fault.parts
-        )
+        reading = columns.reading.channel
+        own = freedom_of_column(reading.name, reading.unit).refusal(fault, [c.quoted for c in columns.used])
+        super().__init__(own.what, where=own.where, remedy=own.remedy, options=own.options, parts=own.parts)
         self.columns = columns
 
 
@@ -129,7 +132,7 @@ def _as_numbers(
         raise Unread(joined(faults), run)
     remarks = [*run.remarks, *time.why, *reading.why, *(() if driven is None else driven.why)]
     if table.native:
-        remarks += _apart(table, channel, driven, choices, where)
+        remarks += _apart(table, reading, driven, choices, where)
         if driven is not None and (how := table.aligned.get(driven.channel.name)) is not None:
             remarks.append(how)
         if driven is not None and (outside := _without_input(reading, driven)).any():
@@ -192,15 +195,15 @@ def with_readings(tables: Sequence[Table], choices: ImportChoices, where: str) -
 
 
 def _apart(
-    table: Table, reading: Channel, driven: RunColumn | None, choices: ImportChoices, where: str
+    table: Table, reading: RunColumn, driven: RunColumn | None, choices: ImportChoices, where: str
 ) -> list[str]:
     """The columns that cannot be aligned with the reading; refused where one of them may be the input."""
-    remarks = []
+    remarks, freedom = [], FREEDOMS[reading.motion]
     for name, unit, why in table.apart:
         column = Channel(name, np.empty(0), unit)
         stated = choices.input is not None and matches(column, choices.input)
-        if stated or (choices.input is None and driven is None and names_input(column)):
-            what = f"'{one_line(name, 40)}' cannot be aligned with {reading.quoted}: {why}"
+        if stated or (choices.input is None and driven is None and names_input(column, freedom)):
+            what = f"'{one_line(name, 40)}' cannot be aligned with {reading.channel.quoted}: {why}"
             option = "--input none"
             remedy = f"record both on one clock, or give {option} if it is a free decay"
             raise TunnelError(what, where=where, remedy=remedy, options=(option,))
@@ -302,7 +305,7 @@ def _readings(
     others = [c for c in free if not is_input(c) and c is not driving]
     measured = [c for c in others if not names_command(c)]
     level, found = _likeliest(measured)
-    if level >= _UNNAMED and len(measured) < len(others):
+    if level >= _UNNAMED and level not in _LINEAR and len(measured) < len(others):
         twins = {without_command(c.name) for c in others if c not in measured}
         own = [c for c in measured if c.name.strip().lower() in twins]
         if found and not own:
@@ -327,8 +330,8 @@ def _readings(
 
 
 def _likeliest(channels: Sequence[Channel]) -> tuple[int, list[Channel]]:
-    """The columns that are most likely readings, and how they show it: from 0, most certain, to 8, not at all."""
-    levels: list[list[Channel]] = [[] for _ in range(8)]
+    """The columns that are most likely readings, and how they show it: from 0, most certain, to 11, not at all."""
+    levels: list[list[Channel]] = [[] for _ in range(11)]
     for c in channels:
         kind, by_name = kind_of(c.unit), ANGLE.search(c.name) and not named_kind(c.name)
         if not _span(c) > 0.0:
@@ -341,14 +344,22 @@ def _likeliest(channels: Sequence[Channel]) -> tuple[int, list[Channel]]:
             levels[2].append(c)
         elif kind == "counts":
             levels[3].append(c)
-        elif linear_unit(c.unit or column_unit(c.name)):
-            levels[7].append(c)
+        elif (linear := linear_unit(c.unit or column_unit(c.name))) is not None:
+            of_base = DISPLACEMENT.input_kind(c.name, linear[1]) is not None
+            levels[_LINEAR[-1 if of_base else tuple(DISPLACEMENT.units).index(linear[0])]].append(c)
         elif c.unit == "" and not (OTHER.search(c.name) or named_kind(c.name) or resembles(c.name, "")):
             levels[_UNNAMED].append(c)
         elif kind == "voltage":
             levels[5].append(c)
         elif kind in ("rate", "acceleration"):
             levels[6].append(c)
+    if any(
+        levels[at] for at in _LINEAR[:-1]
+    ):  # beside a column in mm, a column that may drive is not the reading
+        levels[_UNNAMED : _UNNAMED + 2] = [
+            [c for c in level if not names_input(c, DISPLACEMENT)]
+            for level in levels[_UNNAMED : _UNNAMED + 2]
+        ]
     return next(((at, level) for at, level in enumerate(levels) if level), (len(levels), []))
 
 

@@ -86,6 +86,8 @@ _KINDS = {
     "release_angle": "angle",
 }
 _SIZES = {
+    "mass": {"kg": 1.0, "g": 1e-3},
+    "release_displacement": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
     "yaw_inertia": {"kgm2": 1.0, "kgm^2": 1.0, "gcm2": 1e-7, "gcm^2": 1e-7},
     "frontal_area": {"m2": 1.0, "m^2": 1.0, "cm2": 1e-4, "cm^2": 1e-4, "mm2": 1e-6, "mm^2": 1e-6},
     "reference_length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},

@@ -20,6 +20,7 @@ from tunnel_sim.files.importing.units import split_unit
 from tunnel_sim.files.reading import stem_of
 from tunnel_sim.files.toml_input import validate
 from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
+from tunnel_sim.vocabulary.freedom import DISPLACEMENT
 
 
 def _same(name: str) -> str:
@@ -31,12 +32,19 @@ _OF_FILES = re.compile(r"(?i)(file|datei)(_? ?name)?|sheet|blatt|tabelle|id")
 
 
 class ConditionTable:
-    """A table of conditions in a text file, one row for each file or run, with the names that files use too."""
+    """A table of conditions in a text file, one row for each file or run, with the names that files use too.
+
+    Attributes:
+        displaced: name of a column that only a displacement has; empty where there is none.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         names, rows = read_cells(path)
         split = [split_unit(name) for name in names]
+        own = {i: twin for i, heading in enumerate(split) if (twin := _of_displacement(heading)) is not None}
+        self.displaced = one_line(names[min(own)], 40) if own else ""
+        split = [own[i][:2] if i in own else heading for i, heading in enumerate(split)]
         keys = [condition_of(*heading, alone=True) or resembles(*heading) for heading in split]
         self._key = next((i for i, name in enumerate(names) if _names_a_run(name)), None)
         used = {key: i for i, key in enumerate(keys) if key in RUN_KEYS}
@@ -49,6 +57,7 @@ class ConditionTable:
         for key in (key for key, factor in factors.items() if factor is None):
             what = f"the column '{one_line(names[used[key]], 40)}' is not in a unit of {key}"
             raise TunnelError(what, where=shown(path), remedy=f"use one of {units_of(key)}")
+        factors |= {key: own[i][2] for key, i in used.items() if i in own}
         self.ignored = tuple(n for i, n in enumerate(names) if i != self._key and i not in used.values())
         self.remarks = [
             f"{path.name}: {key} from '{names[i]}'"
@@ -81,6 +90,15 @@ class ConditionTable:
                 return self._rows[_same(name)]
         what = f"no row for run '{one_line(run)}' of {one_line(path.name)}"
         raise TunnelError(what, where=shown(self.path), remedy="add a row with that run or file")
+
+
+def _of_displacement(heading: tuple[str, str]) -> tuple[str, str, float] | None:
+    """Name and unit for an angle, and factor to SI, of a condition that only a displacement has; None of others."""
+    name, unit, factor = DISPLACEMENT.condition(*heading)
+    key = condition_of(name, unit, alone=True)
+    if (name, unit) == heading or key not in RUN_KEYS or in_si(key, unit) is None:
+        return None
+    return name, unit, factor
 
 
 def _names_a_run(heading: str) -> bool:

@@ -31,6 +31,7 @@ from tunnel_sim.files.plausible import plausible_values
 from tunnel_sim.files.toml_input import validate
 from tunnel_sim.vocabulary.campaign import needs_density
 from tunnel_sim.vocabulary.errors import TunnelError, asking, counted, did_you_mean, one_line
+from tunnel_sim.vocabulary.freedom import ANGLE, Freedom
 
 _OFF = 0.5  # of the range: the median of a wind speed that starts late is further from zero
 _EVEN = 1e-9  # of a value: a column that varies less is constant
@@ -86,25 +87,31 @@ class Stated:
 
 
 def find_conditions(
-    table: Table, beside: Sequence[Channel], choices: ImportChoices, where: str
+    table: Table, beside: Sequence[Channel], choices: ImportChoices, where: str, freedom: Freedom = ANGLE
 ) -> tuple[Stated, list[str]]:
     """The statements of a table on the conditions of its runs, and remarks on them.
 
     Args:
         beside: the columns used otherwise.
+        freedom: of the readings, under whose names and units conditions are stated.
     """
     claimed = choices.stated_by.model_dump(exclude_none=True)
-    numbers, hints, remarks = _from_facts(table.facts, claimed, where)
+    numbers, hints, remarks = _from_facts(table.facts, claimed, where, freedom)
     columns: dict[str, Channel] = {}
     like = []
     for channel in table.channels:
         if any(channel is one for one in beside):
             continue
         key = next((key for key, text in claimed.items() if claims(text, channel.name, channel.unit)), None)
-        key = key or condition_of(channel.name, channel.unit)
-        if key is not None and in_si(key, channel.unit) is not None:
+        name, unit, factor = freedom.condition(channel.name, channel.unit)
+        if unit != channel.unit:
+            channel = replace(channel, unit=unit, values=factor * channel.values)
+        key = key or condition_of(name, unit)
+        if (key or resembles(name, unit)) in freedom.refused:
+            continue
+        if key is not None and in_si(key, unit) is not None:
             columns.setdefault(key, channel)  # the first of several that state the same
-        elif hint := _hint(channel.name, channel.unit, key, float("nan")):
+        elif hint := _hint(name, unit, key, float("nan")):
             like.append((channel, hint))
     known = {**table.facts, **{channel.name: 0.0 for channel in table.channels}}
     for key, text in claimed.items():
@@ -112,15 +119,15 @@ def find_conditions(
             what = f"no column or number '{one_line(text, 40)}' that states {key}"
             raise TunnelError(what, where=where, remedy=f"--set {key}: {did_you_mean(text, known)}")
     hints += [hint for name, text in table.texts.items() if (hint := _hint_of_text(name, text)) is not None]
-    remarks += _unused_statements(table, claimed)
+    remarks += _unused_statements(table, claimed, freedom)
     return Stated(numbers, columns, hints=tuple(hints), like=tuple(like)), remarks
 
 
-def _unused_statements(table: Table, claimed: Mapping[str, str]) -> list[str]:
+def _unused_statements(table: Table, claimed: Mapping[str, str], freedom: Freedom) -> list[str]:
     """A remark on the numbers and texts of a table that are neither used nor reported otherwise."""
     found = []
     for heading, value in table.facts.items():
-        name, unit = split_unit(heading)
+        name, unit, _ = freedom.condition(*split_unit(heading))
         used = condition_of(name, unit, alone=True) is not None or any(
             claims(text, name, unit) for text in claimed.values()
         )
@@ -148,7 +155,7 @@ def _hint_of_text(name: str, text: str) -> Hint | None:
 
 
 def _from_facts(
-    facts: Mapping[str, float], claimed: Mapping[str, str], where: str
+    facts: Mapping[str, float], claimed: Mapping[str, str], where: str, freedom: Freedom
 ) -> tuple[dict[str, float], list[Hint], list[str]]:
     """Conditions and sizes stated by numbers of a file, by key, in the units of `Conditions`; hints; remarks.
 
@@ -162,7 +169,10 @@ def _from_facts(
         name, unit = split_unit(heading)
         key = next((key for key, text in claimed.items() if claims(text, name, unit)), None)
         sure = key is not None
-        key = key or condition_of(name, unit, alone=True)
+        name, unit, own = freedom.condition(name, unit)
+        key, value = key or condition_of(name, unit, alone=True), own * value
+        if (key or resembles(name, unit)) in freedom.refused:
+            continue
         if key is not None and (factor := in_si(key, unit)) is not None:
             if sure or names.get(key) not in claimed.values():
                 conditions[key], names[key] = float(value) * factor, name

@@ -14,7 +14,7 @@ from tunnel_sim.files.importing.condition_names import Conditions, Hint
 from tunnel_sim.files.importing.condition_table import ConditionTable
 from tunnel_sim.files.importing.file_names import from_name, name_hints, name_pattern
 from tunnel_sim.files.reading import stem_of
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError, shown
 from tunnel_sim.vocabulary.freedom import Freedom
 
 
@@ -58,8 +58,15 @@ class ImportStatements:
         Raises:
             TunnelError: for a condition that the freedom does not have.
         """
+        if self.table is not None and self.table.displaced and freedom.turns:
+            what = (
+                f"the column '{self.table.displaced}' is of a displacement, and the readings are of an angle"
+            )
+            raise TunnelError(
+                what, where=shown(self.table.path), remedy="give it in the unit of an angle, or --unit"
+            )
         stated = self.choices.conditions.model_dump(exclude_none=True)
-        own = freedom.as_angle(stated, "--set")
+        own = freedom.as_angle(stated, "--set", imported=True)
         if not freedom.windy:
             own = {"wind_speed": 0.0, **own}
         return replace(self, choices=self.choices.model_copy(update={"conditions": Conditions(**own)}))

@@ -14,7 +14,8 @@ from tunnel_sim.files.importing.condition_names import condition_of
 from tunnel_sim.files.importing.remarks import doubt
 from tunnel_sim.files.importing.tables import Channel, RunColumn, is_input
 from tunnel_sim.vocabulary.errors import TunnelError, asking, counted, did_you_mean, one_line
-from tunnel_sim.vocabulary.input_kinds import INPUTS, KINDS, Command, InputColumn
+from tunnel_sim.vocabulary.freedom import FREEDOMS, Freedom
+from tunnel_sim.vocabulary.input_kinds import INPUTS, Command, InputColumn
 from tunnel_sim.vocabulary.inputs import Input, checked_input
 from tunnel_sim.vocabulary.quantities import PerSample, Rows, Share
 from tunnel_sim.vocabulary.record import Record
@@ -41,12 +42,13 @@ def stated_input(channels: Sequence[Channel], choices: ImportChoices) -> Channel
 
 def names_command(channel: Channel) -> bool:
     """Whether a column is the command of a servo by its name and unit."""
-    return _claimed(channel) == Command.column
+    return any(_claimed(channel, freedom) == Command.column for freedom in FREEDOMS.values())
 
 
-def names_input(channel: Channel) -> bool:
-    """Whether a column may be an input by its name and unit, and is not a condition."""
-    plausible = is_input(channel) or _claimed(channel) is not None or _NAMES.search(channel.name) is not None
+def names_input(channel: Channel, freedom: Freedom) -> bool:
+    """Whether a column may be an input of a motion by its name and unit, and is not a condition."""
+    claimed = is_input(channel) or _claimed(channel, freedom) is not None
+    plausible = claimed or _NAMES.search(channel.name) is not None
     return plausible and condition_of(channel.name, channel.unit) is None
 
 
@@ -80,7 +82,7 @@ def find_input(
     candidates = [*exact]
     for channel in () if exact else others:
         good = np.isfinite(channel.values) & np.isfinite(values)
-        if not names_input(channel) or np.count_nonzero(good) < 16:
+        if not names_input(channel, FREEDOMS[reading.motion]) or np.count_nonzero(good) < 16:
             continue
         record = Record(np.arange(np.count_nonzero(good), dtype=np.float64), values[good])
         with suppress(TunnelError):  # it is not the motion itself
@@ -116,18 +118,19 @@ def _as_input(
     Args:
         beside: remarks on other columns.
     """
-    remarks = [*beside]
-    column = choices.input_as or _claimed(channel) or "drive"
-    kind = INPUTS[column]
-    factor, name = kind.factor(channel.unit), one_line(channel.name, 40)
-    if kind.of_spring and channel.unit in ("", "counts"):
-        if choices.calibration is not None or (channel.unit and choices.counts_per_turn is None):
+    remarks, freedom = [*beside], FREEDOMS[reading.motion]
+    stated = None if choices.input_as is None else freedom.stated_input(choices.input_as, "--input-as")
+    column = stated or _claimed(channel, freedom) or "drive"
+    kind, unit = INPUTS[column], freedom.input_unit(channel.name, channel.unit)
+    factor, name = freedom.input_factor(kind, unit), one_line(channel.name, 40)
+    if kind.of_spring and unit in ("", "counts"):
+        if choices.calibration is not None or (unit and choices.counts_per_turn is None):
             what = f"'{name}' has no unit of an angle, and the reading's unit is not its own"
             remedy = (
                 f"give the unit in its name, such as {name}_deg; or --input-as drive, whose gain is fitted"
             )
             raise TunnelError(what, where=where, remedy=remedy)
-        factor = kind.factor(reading.unit) / (choices.counts_per_turn or 1.0)
+        factor = freedom.input_factor(kind, reading.unit) / (choices.counts_per_turn or 1.0)
         if choices.input_as is None:
             remarks.append(f"'{name}' is taken in the unit of the angle, {reading.unit}")
     size, lag = correlation(channel.values, reading.values)
@@ -137,9 +140,10 @@ def _as_input(
     return RunColumn(channel, channel.values * factor, channel.unit, column, tuple(remarks))
 
 
-def _claimed(channel: Channel) -> InputColumn | None:
-    """The kind of input shown by name and unit of a column; None if they do not show it."""
-    return next((kind.column for kind in KINDS if kind.holds(channel.name, channel.unit)), None)
+def _claimed(channel: Channel, freedom: Freedom) -> InputColumn | None:
+    """The kind of input of a motion shown by name and unit of a column; None if they do not show it."""
+    kind = freedom.input_kind(channel.name, freedom.input_unit(channel.name, channel.unit))
+    return None if kind is None else kind.column
 
 
 def moves_before(values: PerSample, reading: PerSample) -> bool:

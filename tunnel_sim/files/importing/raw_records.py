@@ -30,6 +30,7 @@ from tunnel_sim.files.importing.units import UNITS, kind_of, names_a_time
 from tunnel_sim.files.reading import stem_of
 from tunnel_sim.vocabulary.campaign import Quantity, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError, attempt, counted, joined, one_line, shown
+from tunnel_sim.vocabulary.freedom import FREEDOMS
 from tunnel_sim.vocabulary.quantities import PerSample, Rows, Seconds
 from tunnel_sim.vocabulary.turning_points import HoldsTurningPoints, TurningPoints, are_turning_points
 
@@ -105,7 +106,8 @@ def raw_records(source: Source, beside: ImportStatements) -> list[RawRecord]:
             attempt(faults, asked)
             continue
         for columns in runs:
-            stated, remarks = find_conditions(table, columns.used, choices, where)
+            freedom = FREEDOMS[columns.reading.motion]
+            stated, remarks = find_conditions(table, columns.used, choices, where, freedom)
             stated = replace(stated, named=named, hints=(*stated.hints, *short))
             file = stem_of(path) if beside.several or not (table.part or columns.run) else ""
             name = one_line("-".join(part for part in (file, table.part, columns.run) if part))
@@ -169,8 +171,9 @@ def _records(
             given = replace(driven, values=driven.values[rows[clean.rows]])
             missing = int(np.count_nonzero(~np.isfinite(given.values)))
             if missing:
+                name = FREEDOMS[columns.reading.motion].own_input(driven.role)
                 raise TunnelError(
-                    f"the input {driven.role} has no number at {missing} of {given.values.size} samples",
+                    f"the input {name} has no number at {missing} of {given.values.size} samples",
                     where=where,
                     remedy="give one value for each sample of the reading, on the same clock, or --input none",
                 )

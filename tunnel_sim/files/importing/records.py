@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -72,13 +72,24 @@ class Imported:
 
     def remarks(self, path: Path | None = None) -> list[str]:
         """Remarks on the reading of all files or one, and on changes, each once with its runs."""
-        return [*self._with_places(path), *self.campaign_remarks]
+        return [*self._with_places(path), *self._own(self.campaign_remarks)]
 
     def summary(self) -> tuple[list[str], list[str]]:
         """The remarks beside the table of runs, without its numbers: remarks to know, and remarks to judge."""
         lines = self._with_places(short=True)
         judged = [line for line in lines if line.doubt]
-        return [*(line for line in lines if not line.doubt), *self.campaign_remarks], list(judged)
+        known = [line for line in lines if not line.doubt]
+        return [*known, *self._own(self.campaign_remarks)], list(judged)
+
+    def _own(self, remarks: Iterable[str]) -> list[ImportRemark]:
+        """Remarks in the words of the campaign's freedom; names of columns, files and runs are kept."""
+        channels = {c.quoted for s in self.sources for table in s.tables for c in table.channels}
+        names = {*channels, *(s.path.name for s in self.sources), *(part.id for part in self.parts)}
+        own = partial(self.campaign.sensor.freedom.words, names=names)
+        return [
+            ImportRemark(own(one), own(one.short), doubt=one.doubt, motion=one.motion)
+            for one in (one if isinstance(one, ImportRemark) else ImportRemark(one) for one in remarks)
+        ]
 
     def _with_places(self, path: Path | None = None, *, short: bool = False) -> list[ImportRemark]:
         """The remarks on files and runs, each once after the places that it concerns."""
@@ -87,8 +98,10 @@ class Imported:
         found = [(text, s.path.name) for s in sources for table in s.tables for text in table.remarks]
         found += [(text, part.id) for part in parts for text in (*part.raw.remarks, *part.remarks)]
         places: dict[ImportRemark, list[str]] = {}
-        for text, place in dict.fromkeys(found):
-            remark = text if isinstance(text, ImportRemark) else ImportRemark(text)
+        found = list(dict.fromkeys(found))
+        for remark, place in zip(
+            self._own(text for text, _ in found), (place for _, place in found), strict=True
+        ):
             key = ImportRemark(remark.short, doubt=remark.doubt) if short else remark
             if place not in places.setdefault(key, []):
                 places[key].append(place)
@@ -130,7 +143,7 @@ def read_records(
         except TunnelError as fault:
             faults.append(fault)
     freedom = raws[0].sensor.freedom if raws else ANGLE
-    beside = beside.about(freedom)
+    beside = beside.about(freedom) if raws or not faults else beside
     with freedom.errors():
         parts = _parts(raws, beside, faults)
     if faults:

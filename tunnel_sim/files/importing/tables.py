@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import one_line
-from tunnel_sim.vocabulary.freedom import Motion
-from tunnel_sim.vocabulary.input_kinds import INPUT_COLUMNS
+from tunnel_sim.vocabulary.freedom import FREEDOMS, Motion
 from tunnel_sim.vocabulary.inputs import HOLDS, INPUT_KEYS
 from tunnel_sim.vocabulary.quantities import Rows
 from tunnel_sim.vocabulary.text_cells import from_text_cell
@@ -134,7 +133,7 @@ def by_run(table: Table) -> list[Table]:
 
 def is_input(channel: Channel) -> bool:
     """Whether a column has the format's name for an input, so that it is not the reading."""
-    return heading(channel) in INPUT_COLUMNS
+    return any(heading(channel) in freedom.inputs for freedom in FREEDOMS.values())
 
 
 def heading(channel: Channel) -> str:

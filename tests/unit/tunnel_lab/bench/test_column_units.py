@@ -79,3 +79,10 @@ def test_times_without_a_unit(step: float, unit: str) -> None:
 @pytest.mark.parametrize(("swing", "unit"), [(3.1, "rad"), (3.2, "deg")])
 def test_angles_without_a_unit(swing: float, unit: str) -> None:
     assert guessed_angle_unit(np.array([-swing, np.nan, swing])) == (unit, pytest.approx(swing))
+
+
+def test_a_displacement_is_named_by_its_unit(tmp_path: Path) -> None:
+    time, angle = decay()
+    found = by_name(session(tmp_path, "time_s,pos_mm", time, 40.0 * angle))
+    assert (found["pos_mm"].unit, found["pos_mm"].source) == ("mm", "stated in the file")
+    assert {"deg", "mm", "m/s2", "g"} <= set(found["pos_mm"].units)

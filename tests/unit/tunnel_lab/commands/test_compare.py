@@ -161,3 +161,21 @@ def test_one_file_is_too_few(tunnel: Tunnel, before: Path) -> None:
     status, out, err = tunnel("compare", before, before.parent / "missing.json")
     assert (status, out) == (2, "")
     assert "missing.json" in err
+
+
+def test_displacements_are_compared_in_own_words(tunnel: Tunnel, before: Path, tmp_path: Path) -> None:
+    estimates = {
+        "yaw_inertia": {"value": 2.0, "std": 0.01, "unit": "kg"},
+        "mechanical_damping": {"value": 0.3, "std": 0.02, "unit": "N s/m"},
+    }
+    own = {"motion": "displacement", "motion_scale": 1.0, "coefficients": {"before": {}, "after": estimates}}
+    carts = [written(tmp_path / f"{name}.json", campaign=name, **own) for name in ("cart", "angle")]
+    status, out, err = tunnel("compare", *carts, "--format", "csv")
+    assert (status, err) == (0, "")
+    assert "mass,with the causes,kg,2,0.01,2,0.01" in out
+    assert "quantity,unit,angle,angle: std" in out  # the name of a campaign is kept
+    assert "nertia" not in out
+    status, _, err = tunnel("compare", before, carts[0])
+    assert status == 2
+    assert "cart.json: has motion = 'displacement', and the first one has 'angle'; compare" in err
+    assert err.count("\n") == 1

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from tests.support.linear import FORBIDDEN, linear_campaign
 from tests.unit.tunnel_lab.conftest import Tunnel
@@ -72,6 +73,51 @@ def test_import_identify_diagnose_report(tunnel: Tunnel, files: dict[Path, float
         assert not re.search(FORBIDDEN, text), re.findall(rf".{{0,40}}(?:{FORBIDDEN}).{{0,40}}", text)
 
 
+def test_a_shaken_and_a_pushed_cart_from_file_to_report(tunnel: Tunnel, tmp_path: Path) -> None:
+    """Driven by a force in N and by the acceleration of the base in g; SciPy's friction is found with its size."""
+    k, damping, friction, time = 50.0, 0.3, 0.05, np.arange(3000) / 100.0
+    wave = np.sin(2.0 * np.pi * (0.2 + 0.03 * time) * time)
+
+    def moved(force: np.ndarray) -> np.ndarray:
+        def slope(t: float, state: np.ndarray) -> list[float]:
+            x, v = state
+            dragged = damping * v + k * x + friction * np.tanh(v / 1e-3)
+            return [v, (float(np.interp(t, time, force)) - dragged) / MASS]
+
+        ends = (0.0, float(time[-1]))
+        return np.asarray(
+            solve_ivp(slope, ends, [0.0, 0.0], t_eval=time, rtol=1e-8, atol=1e-10, max_step=0.02).y[0]
+        )
+
+    rng = np.random.default_rng(8)
+    for heading, per_newton in (("force (N)", 1.0), ("base acceleration (g)", -1.0 / (MASS * 9.80665))):
+        files = [tmp_path / f"{heading[:5].strip()}{place}.csv" for place in (1, 2)]
+        for path, peak in zip(files, (1.5, 0.7), strict=True):
+            x = 1e3 * (moved(peak * wave) + 3e-5 * rng.standard_normal(time.size))
+            table = np.stack([time, x, peak * per_newton * wave], axis=1)
+            np.savetxt(path, table, "%.8g", ",", header=f"time (s),x (mm),{heading}", comments="")
+        cart, answer = tmp_path / heading[:5].strip(), tmp_path / f"{heading[:5]}.json"
+        stated = ("--set", f"mass={MASS}", "--set", f"spring_stiffness={k}", "--input-hold", "linear")
+        status, printed, _ = tunnel("import", *files, "--out", cart, *stated, "--yes")
+        assert status == 0
+        shown = [printed.replace(str(tmp_path), "")]
+        status, printed, _ = tunnel(
+            "diagnose", cart, "--json", answer, "--effects", "coulomb_friction,cubic_stiffness"
+        )
+        assert status == 0
+        shown.append(printed)
+        document = json.loads(answer.read_text())
+        assert document["causes"] == ["coulomb_friction"]
+        found = document["candidates"][0]["parameters"]["friction_moment"]
+        assert found["unit"] == "N"
+        assert found["value"] == pytest.approx(friction, rel=0.005)
+        after = document["coefficients"]["after"]
+        assert after["yaw_inertia"]["value"] == pytest.approx(MASS, rel=0.002)
+        assert after["mechanical_damping"]["value"] == pytest.approx(damping, rel=0.02)
+        for text in shown:
+            assert not re.search(FORBIDDEN, text), re.findall(rf".{{0,40}}(?:{FORBIDDEN}).{{0,40}}", text)
+
+
 def test_a_unit_of_length_makes_a_displacement(
     tunnel: Tunnel, files: dict[Path, float], tmp_path: Path
 ) -> None:
@@ -96,3 +142,15 @@ def test_a_wind_is_refused_in_one_line(tunnel: Tunnel, files: dict[Path, float],
     assert "leave wind_speed out" in said
     assert said.count("\n") == 1
     assert not out.exists()
+
+
+def test_springs_give_the_mass(tunnel: Tunnel, tmp_path: Path) -> None:
+    table = tmp_path / "springs.csv"
+    rows = "".join(f"{k},{np.sqrt(k / MASS) / (2.0 * np.pi):.9f}\n" for k in (50.0, 90.0, 140.0, 200.0))
+    table.write_text(f"stiffness_N_per_m,frequency_Hz\n{rows}")
+    status, printed, _ = tunnel("springs", table)
+    assert status == 0
+    assert float(re.search(r"m \(gradient\) = (\S+)", printed)[1]) == pytest.approx(MASS, rel=1e-6)  # type: ignore[index]
+    assert "k [N/m]" in printed
+    assert "ωn² [1/s²]" in printed
+    assert not re.search(FORBIDDEN, printed.replace(str(tmp_path), ""))
