@@ -59,6 +59,7 @@ from diagnosis.remainder.ways import way_for
 from diagnosis.result import Diagnosis
 from diagnosis.search.answer import UNKNOWN, Answer
 from diagnosis.search.clock import Progress
+from diagnosis.search.rivals.rival import rival_facts
 from diagnosis.search.study import Study
 from diagnosis.settings import AnswerSettings
 from diagnosis.where.described import Nowhere, PlaceFound, Where, described, nowhere
@@ -254,7 +255,7 @@ def _beside(study: Study, chosen: Chosen, named: _Named, caveats: tuple[Fact, ..
         immaterial=named.immaterial,
         choices=spring_choices(study),
         hold=other_hold(study),
-        rivals=_from_outside(study) if named.unsure else (),
+        rivals=tuple(rival_facts(study.rivals, study.nominal, study.similarity)) if named.unsure else (),
         second_modes=_second_modes(study, chosen) if unknown else (),
         limit_cycles=named.limit_cycles,
         noise=own_fact(noise.reason, study.similarity),
@@ -483,9 +484,3 @@ def _second_modes(study: Study, chosen: Chosen) -> tuple[TwoModes, ...]:
     """Second modes of single runs, where one may be named: sets of stretches have none."""
     able = any(issubclass(kind, SecondOscillation) for kind in study.prepared.kinds)
     return second_modes(chosen.campaign) if able else ()
-
-
-def _from_outside(study: Study) -> tuple[Fact, ...]:
-    """The facts about rivals from outside the vocabulary that would explain the gap."""
-    said = (one.fact(study.nominal, study.similarity) for one in study.rivals)
-    return tuple(fact for fact in said if fact is not None)

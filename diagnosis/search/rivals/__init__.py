@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from diagnosis.search.rivals.inertia_by_spring import InertiaBySpring
 from diagnosis.search.rivals.rival import Rival
 from diagnosis.search.rivals.second_inertia import TwoInertias
 from diagnosis.search.rivals.two_springs import TwoSprings
 
 #: Weighed where a diagnosis is not given others.
-RIVALS: tuple[Rival, ...] = (TwoSprings(), TwoInertias())
+RIVALS: tuple[Rival, ...] = (TwoSprings(), TwoInertias(), InertiaBySpring())

@@ -15,6 +15,9 @@ RIVAL_EXPLAINS: Final = 0.8
 """Minimum share of a gap that an explanation outside the vocabulary must explain to be mentioned.
 Judgement."""
 
+RIVAL_NEAR: Final = 2.0
+"""Maximum χ² of a rival over the least of all rivals, for it to be mentioned beside that one. Judgement."""
+
 
 class Rival:
     """A possible cause that is not an effect of the vocabulary: its probability is added to ``unknown``."""
@@ -59,11 +62,20 @@ class FoundRival:
     rival: Rival
     hypotheses: tuple[Hypothesis, ...]
 
-    def fact(self, nominal: Fit, similarity: Similarity) -> Fact | None:
-        """Its fact; None where its likeliest hypothesis does not explain most of the gap."""
-        best = min(self.hypotheses, key=lambda one: one.fit.total)
-        return (
-            None
-            if best.fit.excess > (1.0 - RIVAL_EXPLAINS) * nominal.excess
-            else self.rival.fact(best, similarity)
-        )
+    @property
+    def best(self) -> Hypothesis:
+        """Its hypothesis of least χ²."""
+        return min(self.hypotheses, key=lambda one: one.fit.total)
+
+
+def rival_facts(found: Sequence[FoundRival], nominal: Fit, similarity: Similarity) -> list[Fact]:
+    """The facts of the rivals that explain most of the gap, and nearly as much as the best of them."""
+    least = min((one.best.fit.total for one in found), default=0.0)
+    explains = [
+        one
+        for one in found
+        if one.best.fit.excess <= (1.0 - RIVAL_EXPLAINS) * nominal.excess
+        and one.best.fit.total <= RIVAL_NEAR * least
+    ]
+    facts = (one.rival.fact(one.best, similarity) for one in explains)
+    return [fact for fact in facts if fact is not None]

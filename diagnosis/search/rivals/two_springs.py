@@ -71,7 +71,7 @@ class TwoSprings(Rival):
         pairs: dict[tuple[str, ...], Hypothesis] = {}
         for answer in likely:
             kinds = answer.fit.problem.effects
-            others = tuple(sorted(kind.name for kind in kinds if not _differs_by_spring(kind)))
+            others = tuple(sorted(kind.name for kind in kinds if not differs_by_spring(kind)))
             if len(others) == len(kinds) or others in pairs:
                 continue
             one, rest = by_name.get(tuple(sorted((*others, ONE_SPRING.name)))), by_name.get(others)
@@ -101,7 +101,7 @@ def spring_error(fit: Fit, name: str, similarity: Similarity) -> SpringError:
     return SpringError(similarity.own(stated, "N m/rad"), error, inflate * std)
 
 
-def _differs_by_spring(kind: type[Effect]) -> bool:
+def differs_by_spring(kind: type[Effect]) -> bool:
     """Whether an effect changes the frequency of the runs by a share that depends on the spring."""
     stiffens = kind.channel == "stiffness" and kind.condition == "always" and not kind.on_spring
     return stiffens or kind.chosen_spring() is not None

@@ -1,0 +1,140 @@
+"""A cause from outside the vocabulary: an inertia that differs from spring to spring.
+
+Each spring has its adapter and its clamps, and they swing with the body. A spring that is not as stiff as stated
+changes the frequency of its runs alike; what the air adds to stiffness and damping then weighs as much as before.
+With another inertia, all of them weigh more or less. So runs with the wind off and on, or at two amplitudes of a
+nonlinear spring, tell the two apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Final
+
+import numpy as np
+from scipy.special import chdtri
+
+from diagnosis.likelihood.least_squares import Fit, try_fit
+from diagnosis.likelihood.residuals import CHANNELS
+from diagnosis.model.fact import Fact, as_stated
+from diagnosis.model.parameters import Point
+from diagnosis.model.similarity import Similarity
+from diagnosis.search.hypothesis import Hypothesis, restricted
+from diagnosis.search.rivals.rival import Rival
+from diagnosis.search.rivals.two_springs import ONE_SPRING, differs_by_spring
+from diagnosis.search.scatter import without_deviations
+from identification.show.numbers import for_people, listed, plain
+from tunnel_sim.effects.base import SPRING_TOLERANCE, Drawn
+from tunnel_sim.physics.run_settings import SettingsTable
+
+INERTIAS_RATE: Final = 0.001
+"""Rate at which chance alone makes inertias that differ by spring explain more than every set of effects.
+Convention."""
+INERTIAS_BESIDE: Final = 3
+"""Number of sets of effects beside which inertias that differ by spring are tried. Judgement. Time against
+coverage."""
+
+
+@dataclass(frozen=True)
+class InertiaOfSpring(ONE_SPRING):  # type: ignore[valid-type, misc]
+    """An inertia that differs in the runs of one spring."""
+
+    @classmethod
+    def on_runs(
+        cls,
+        runs: SettingsTable,
+        stated: SettingsTable,
+        effects: Sequence[InertiaOfSpring],
+        drawn: Sequence[Drawn],
+    ) -> None:
+        """Change the inertia in the spring's runs."""
+        del drawn
+        spring, its = stated.spring_stiffness, cls.column(effects, "spring_stiffness")
+        concerned = np.abs(spring - its) <= SPRING_TOLERANCE * np.maximum(np.abs(spring), np.abs(its))
+        runs["yaw_inertia"][concerned] *= 1.0 + cls.column(effects, "error")[concerned]
+
+
+@cache
+def _kind(number: int) -> type[InertiaOfSpring]:
+    """One of several such inertias."""
+    return dataclass(frozen=True)(
+        type(f"InertiaOfSpring{number}", (InertiaOfSpring,), {"name": f"inertia_of_spring_{number}"})
+    )
+
+
+class InertiaBySpring(Rival):
+    """An inertia of every spring, in place of the effects of answers that change the frequency with the spring."""
+
+    def hypotheses(
+        self, likely: Sequence[Hypothesis], known: Sequence[Hypothesis], nominal: Fit
+    ) -> list[Hypothesis]:
+        """The inertias with the other effects of each answer, where they explain more than every set of effects.
+
+        None with one spring, and none where effects alone explain the readings down to their noise. The law is
+        exact, so it must leave no more than chance: beside runs that differ, it would take up a part of that.
+        """
+        data = nominal.problem.data
+        if len(data.springs) < 2 or data.driven:
+            return []
+        repeating = [fit for fit in (nominal, *(one.fit for one in known)) if not fit.problem.scatter]
+        least = min(repeating, key=lambda fit: fit.total, default=None)
+        if least is not None and least.total - least.count < chdtri(len(least.problem.names), INERTIAS_RATE):
+            return []
+        bases: dict[tuple[str, ...], Hypothesis] = {(): Hypothesis((), nominal)}
+        for answer in likely:
+            kinds = [kind for kind in answer.fit.problem.effects if not differs_by_spring(kind)]
+            names = tuple(kind.name for kind in kinds)
+            bases.setdefault(names, Hypothesis(names, restricted(answer.fit, names)))
+        tried = [
+            one
+            for base in list(bases.values())[:INERTIAS_BESIDE]
+            if (one := _with_inertias(base)) is not None
+        ]
+        exact = [one for one in tried if one.leaves_within(np.zeros(len(CHANNELS)))]
+        better = [one for one in exact if least is None or _explains_more(one.fit, least.total)]
+        return [
+            one
+            for one in better
+            if all(
+                _explains_more(one.fit, part.fit.total) for part in better if set(part.names) < set(one.names)
+            )
+        ]
+
+    def fact(self, best: Hypothesis, similarity: Similarity) -> Fact:
+        """The differences of the inertia by spring, and the effects that act with them."""
+        fit, data = best.fit, best.fit.problem.data
+        inflate = 100.0 * float(np.sqrt(1.0 + max(fit.excess, 0.0)))
+        each = []
+        for number, spring in enumerate(data.springs[1:]):
+            name = f"{_kind(number).name}.error"
+            size = for_people(100.0 * fit.value(name), inflate * fit.std(name), "%")
+            each.append(f"{size} with the spring of {similarity.own(spring, 'N m/rad'):g} N m/rad")
+        own = {_kind(number).name for number in range(len(data.springs) - 1)}
+        others = [name for name in best.names if name not in own]
+        beside = f" beside {plain(*others)}" if others else ""
+        return as_stated(
+            f"An inertia that differs from spring to spring would explain the gap{beside}: "
+            f"{listed(each)}, against the softest. Weigh the adapters and clamps of the springs."
+        )
+
+
+def _with_inertias(base: Hypothesis) -> Hypothesis | None:
+    """A set with an inertia of each spring but the softest."""
+    problem, point = without_deviations(base.fit)
+    springs = problem.data.springs[1:]
+    kinds = tuple(_kind(number) for number in range(len(springs)))
+    fixed = tuple(
+        (f"{kind.name}.{ONE_SPRING.chosen_spring()}", spring)
+        for kind, spring in zip(kinds, springs, strict=True)
+    )
+    problem = replace(problem, effects=(*problem.effects, *kinds), fixed=(*problem.fixed, *fixed))
+    fitted = try_fit(problem, Point(np.append(point.common, np.zeros(len(kinds))), point.per_run))
+    return None if fitted is None else Hypothesis((*base.effects, *(kind.name for kind in kinds)), fitted)
+
+
+def _explains_more(fitted: Fit, least: float) -> bool:
+    """Whether a fit lowers χ² below the least of all sets by more than chance, whatever both leave."""
+    drop = (least - fitted.total) / (1.0 + max(fitted.excess, 0.0))
+    return drop > float(chdtri(len(fitted.problem.names), INERTIAS_RATE))

@@ -1,0 +1,68 @@
+"""An inertia that differs from spring to spring. Truth: solutions in closed form."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from diagnosis import diagnose
+from diagnosis.search.answer import UNKNOWN
+from diagnosis.search.rivals.inertia_by_spring import InertiaBySpring
+from tests.support.gap_campaigns import CN_BETA, CN_R, DAMPING, INERTIA, NOISE, nominal
+from tunnel_sim.effects import effect_class
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.record import Record
+
+pytestmark = pytest.mark.usefixtures("causes_alone")
+
+AREA, LENGTH, DENSITY, INTERVAL = 0.036, 0.625, 1.2, 4e-3
+KINDS = [effect_class(name) for name in ("gravity_stiffness", "rod_flexibility", "spring_miscalibration")]
+BY_SPRING = {16.12: 0.0, 28.3: -0.0033, 44.84: 0.0018}
+
+
+def decays(
+    inertias: Mapping[float, float], stiffness: Mapping[float, float] = {}, scatter: float = 0.0
+) -> Campaign:
+    """Linear decays at three speeds, with relative errors of inertia and stiffness by spring."""
+    rng, runs = np.random.default_rng(4), list[Run]()
+    time = INTERVAL * np.arange(2500)
+    for spring, error in inertias.items():
+        for speed in (0.0, 15.0, 25.0):
+            pressure = 0.5 * DENSITY * speed * AREA * LENGTH
+            inertia = INERTIA * (1.0 + error)
+            held = spring * (1.0 + stiffness.get(spring, 0.0) + scatter * rng.standard_normal())
+            damping, spin = DAMPING - pressure * LENGTH * CN_R, held - pressure * speed * CN_BETA
+            rate = -0.5 * damping / inertia
+            omega = np.sqrt(spin / inertia - rate**2)
+            swing = 0.35 * np.exp(rate * time) * (np.cos(omega * time) - rate / omega * np.sin(omega * time))
+            reading = swing + NOISE * rng.standard_normal(time.size)
+            name = f"r{len(runs) + 1:02d}"
+            runs.append(Run(name, Record(time, reading), speed, spring, DENSITY if speed else None, 0.35))
+    rig = RigProperties(INERTIA, AREA, LENGTH, 0.225)
+    return Campaign("adapters", rig, SensorProperties(1.0 / INTERVAL, None, NOISE), tuple(runs))
+
+
+def test_an_inertia_that_differs_by_spring_is_unknown_and_said_with_its_size() -> None:
+    found = diagnose(decays(BY_SPRING), kinds=KINDS)
+    assert tuple(found.causes) == UNKNOWN
+    assert "An inertia that differs from spring to spring would explain the gap: −0.33" in found.verdict
+    assert "Two springs" not in found.verdict  # these leave much more
+
+
+@pytest.mark.slow
+def test_without_the_rival_it_takes_a_false_name() -> None:
+    assert tuple(diagnose(decays(BY_SPRING), kinds=KINDS, rivals=()).causes) != UNKNOWN
+
+
+def test_a_spring_that_is_not_as_stiff_as_stated_keeps_its_name() -> None:
+    found = diagnose(decays(dict.fromkeys(BY_SPRING, 0.0), {28.3: 0.005}), kinds=KINDS)
+    assert tuple(found.causes) == ("spring_miscalibration",)
+
+
+def test_the_inertias_take_up_no_part_of_the_scatter_between_runs() -> None:
+    base = nominal(decays(dict.fromkeys(BY_SPRING, 0.0), scatter=1e-3))
+    assert InertiaBySpring().hypotheses([], [], base) == []
+    (found,) = InertiaBySpring().hypotheses([], [], nominal(decays(BY_SPRING)))
+    assert found.names == ("inertia_of_spring_0", "inertia_of_spring_1")
