@@ -42,18 +42,19 @@ class Coefficients:
     """Coefficients of the nominal model before and after the causes are added.
 
     Args:
-        before: by name: ``cn_beta`` and ``cn_r``; these times the rig's unstated sizes (``cn_beta_area_length``,
-            ``cn_r_area_length2``); ``omega_n`` and ``zeta`` in normalised form; or ``yaw_inertia``,
-            ``mechanical_damping`` and ``moment_offset`` of a body without a spring.
-        after: by the same names, with the causes.
-        in_phase: with a named lag, ``cn_beta`` and ``cn_r`` in phase with angle and rate, which the runs determine
-            better than the coefficients of the law beside the lag; else empty.
+        before: by name: ``cn_beta`` and ``cn_r``; their products with the rig's unstated sizes
+            (``cn_beta_area_length``, ``cn_r_area_length2``); ``omega_n`` and ``zeta`` in normalised form; or
+            ``yaw_inertia``, ``mechanical_damping`` and ``moment_offset`` of a body without a spring.
+        after: by the same names, with the causes added.
+        in_phase: with a named lag, ``cn_beta`` and ``cn_r`` in phase with angle and rate; the runs determine
+            these better than the coefficients of the law beside the lag. Empty without a named lag.
         covariance: of ``cn_beta`` and ``cn_r`` in ``after``, and of both in ``in_phase``, 1/rad², shape (4, 4);
             empty without a named lag.
-        note: on their meaning, where a cause changes it (a lag changes the meaning of Cnr).
-        correlation: of the coefficients after, in their order, by the noise of the readings, the small causes and
-            the rivals; the other parts of their variances count as independent. Shape (n, n); empty where it is not
-            known.
+        note: the meaning of the coefficients where a cause changes it, as a lag changes that of Cnr; else
+            empty.
+        correlation: correlation of the coefficients in ``after``, in their order, by the noise of the readings,
+            the small causes and the rivals; the other parts of the variances are taken as independent. Shape
+            (n, n); empty where it is not known.
     """
 
     before: Mapping[str, Quantity]
@@ -73,9 +74,9 @@ class Coefficients:
 
 
 def coefficients_table(given: Coefficients, judged: Judged) -> TextTable:
-    """The coefficients of the nominal model; where causes are named, also with these, and the change of size.
+    """The coefficients of the nominal model and, if causes are named, with the causes, and the change of size.
 
-    A terminal shows the 95 % intervals only where one is not the value ± 1.96 standard deviations.
+    A terminal shows the 95 % intervals only where one differs from the value ± 1.96 standard deviations.
     """
     before, after = given.before, given.after
     named, rows = judged.names_effects, []
@@ -102,7 +103,8 @@ def coefficients_table(given: Coefficients, judged: Judged) -> TextTable:
 def _rows(given: Coefficients) -> Iterator[tuple[str, Quantity | None, Quantity | None]]:
     """Label of a coefficient, and its estimates by the nominal model and with the causes.
 
-    The nominal model has no lag, so with a named lag its coefficients compare with the derivatives in phase.
+    With a named lag the nominal coefficients compare with the derivatives in phase: the nominal model has no
+    lag.
     """
     before, after = given.before, given.after
     phase = given.in_phase
@@ -166,9 +168,9 @@ def budget_table(given: Coefficients) -> TextTable:
 
 
 def coefficients_line(given: Coefficients) -> str:
-    """Contributions to the coefficients' standard deviations that ``identify`` does not include.
+    """The part of the coefficients' standard deviations that ``identify`` does not include, by source.
 
-    Empty where none is known.
+    Empty if there is no such part.
     """
     after = {name: one for name, one in given.after.items() if one.std}
     if not after:
@@ -191,8 +193,8 @@ def coefficients_line(given: Coefficients) -> str:
     )
 
 
-_COUNTS = 0.005  # of a variance: a smaller share changes no digit of its root
-_MOST = 0.5  # of a variance: more than all its other sources together
+_COUNTS = 0.005  # share of a variance: a smaller one changes no digit of its root
+_MOST = 0.5  # share of a variance: it exceeds all other sources together
 
 
 def hidden_table(hidden: Sequence[Hidden], given: Coefficients) -> TextTable:
@@ -220,9 +222,10 @@ def _limit(one: Hidden, value: float) -> str:
 
 
 def hidden_line(hidden: Sequence[Hidden], given: Coefficients) -> str:
-    """The undetected effects that would change a coefficient by more than its ±; empty where none would.
+    """The undetected effects that would change a coefficient by more than its ±; empty if there are none.
 
-    The one with the greatest change against the ±, and each that states how to read the coefficients without it.
+    Named are the effect with the greatest change relative to the ±, and each effect that states how to read the
+    coefficients without it.
     """
     after, general_form = given.after, Effect.undetected
     clauses: list[tuple[bool, str]] = []
@@ -282,7 +285,7 @@ def consequence(given: Coefficients, judged: Judged) -> str:
 
 
 def _of_the_rate(given: Coefficients) -> str:
-    """The two parts of Cnr in phase with the rate, in a sentence."""
+    """A sentence on the two parts of Cnr in phase with the rate."""
     name = next(name for name in given.in_phase if name.startswith("cn_r"))
     whole, own = given.in_phase[name], given.after[name]
     lag = _digits(whole.value - own.value, 3)
@@ -309,7 +312,7 @@ def _digits(value: float, digits: int) -> str:
 
 
 def coefficient_note(given: Coefficients, judged: Judged) -> str:
-    """Notes on the coefficients: changes of meaning by a cause, and the effect of unstated sizes."""
+    """Notes on the coefficients: their changed meaning under a cause, and the effect of unstated sizes."""
     if judged.cycling:
         return _NO_DECAY
     before = given.before

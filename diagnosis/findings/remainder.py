@@ -51,16 +51,17 @@ MATERIAL_SHARE: Final = 0.01
 quoted to one per cent."""
 
 NOISE_STDS: Final = 2.0
-"""Margin of the upper bound on the explainable share, where the residual is noise, in standard deviations.
+"""Margin of the upper bound on the explainable share where the residual is noise, in standard deviations.
 Convention."""
 
 
 @dataclass(frozen=True)
 class Move:
-    """Move of a coefficient by the remainder.
+    """Move of a coefficient due to the remaining gap.
 
     Args:
-        value: half the difference between the halves of the data that differ most, beyond chance, in ``unit``.
+        value: half the excess over chance of the difference between the two most different halves of the data,
+            in ``unit``.
         relative: ``value`` over the coefficient's absolute value, a fraction; None where the coefficient is zero.
         std: standard deviation stated for the coefficient, in ``unit``; None where the runs do not determine it.
         material: whether the remainder is significant and moves the coefficient by more than its standard
@@ -79,12 +80,13 @@ class Remainder:
     """The gap that remains after the named causes; the whole gap where none is named.
 
     Args:
-        significant: whether it is beyond chance, by the tests of the gap.
-        excess: on held-out readings, in noise variances of a sample.
-        p_value: of the strongest test, corrected for the number of tests.
-        material: whether it is significant and moves a coefficient by more than its standard deviation or by 1 %.
+        significant: whether the remaining gap is beyond chance, by the tests of the gap.
+        excess: mean squared scaled residual minus one on held-out readings, in noise variances of a sample.
+        p_value: p-value of the strongest test, corrected for the number of tests.
+        material: whether the gap is significant and moves a coefficient by more than its standard deviation or
+            by 1 %.
         words: the remainder in sentences; empty until they are written.
-        further: a significant effect beside the causes that is too small to be named; empty where there is none.
+        further: a significant effect beside the causes that is too small to be named; empty if there is none.
     """
 
     significant: bool
@@ -101,9 +103,7 @@ class Remainder:
         after, named = judged.coefficients_after, judged.names_effects
         moves, excess, misfit = rest.moves, rest.excess, judged.misfit
         size = f"{misfit.rms_words(excess)} root mean square"
-        larger = (
-            excess > 1.0
-        )  # than the noise: people see it in the fit, whatever it does to the coefficients
+        larger = excess > 1.0  # visible in the fit, whatever the move of the coefficients
         if larger:
             size = f"{size}, {significant(math.sqrt(excess), 2)} times the noise"
         left = f"the residual ({size})" if named else "the gap"
@@ -136,25 +136,27 @@ class Remainder:
 def remainder(
     study: Study, stated: Estimates, moved: Mapping[str, float], excess: float, hidden: Sequence[Hidden] = ()
 ) -> Remainder:
-    """Judge the residual gap of the answer; a remainder within chance is never material.
+    """Judge the residual gap of the answer; a gap within chance is never material.
 
-    The tests by band are blind to whatever coloured noise absorbs. A significant further effect shows it.
+    Coloured noise absorbs a part of the residual that the tests by band cannot see. A significant further
+    effect shows it.
 
     Args:
         stated: the coefficients of the answer's fit with their standard deviations.
-        moved: by the same names, their moves by the remainder (`coefficient_move`), in their units.
+        moved: moves of the coefficients by the remainder, by the same names (`coefficient_move`), in their
+            units.
         excess: on held-out readings, in noise variances of a sample.
         hidden: the effects that could hide beside the answer; effects without a limit do not count.
     """
     moment, chosen = study.moment, study.settings.answer
-    if moment is not None:  # its runs have innovations
+    if moment is not None:  # the runs have innovations
         runs = zip(study.chosen.problem.data.runs, study.chosen.residuals, strict=True)
         still = [residual for run, residual in runs if run.id not in moment.process.runs]
         both = np.concatenate([*moment.process.innovations, *still])
         p_value = float(chdtrc(both.size, both @ both))
     elif study.chosen is study.nominal:
         p_value = study.gap.test.p_value
-    else:  # no cause changes the tests of the noise itself: the tests of the residuals count
+    else:  # no cause changes the tests of the noise itself, so the tests of the residuals count
         noise = study.prepared.noise.rounded(study.chosen, study.prepared.step)
         p_value = gap_test(study.chosen, noise, study.prepared.trend, coarse_step=True).p_value
     hidden = [one for one in hidden if one.size.determined]
@@ -166,7 +168,7 @@ def remainder(
     moves = {}
     for name, given in stated.items():
         relative = moved[name] / abs(given.value) if given.value else None
-        # by its standard deviation, or by a share, where the runs determine it
+        # by the standard deviation, or by 1 %, where the runs determine the coefficient
         far = given.std is not None and (moved[name] > given.std or (relative or 0.0) > MATERIAL_SHARE)
         moves[name] = Move(moved[name], relative, given.std, given.unit, material=beyond_chance and far)
     return Remainder(
@@ -180,12 +182,12 @@ def remainder(
 
 
 def _each(sizes: dict[str, str]) -> str:
-    """Coefficients with the sizes of their changes."""
+    """Text: each coefficient with the size of its change."""
     return listed([f"{COEFFICIENTS.get(name, name)} by {size}" for name, size in sizes.items()])
 
 
 def closable_words(found: Closable | None, judged: Judged) -> str:
-    """The part of the remainder that could be explained, in a few sentences; empty where it is not known."""
+    """A few sentences on the explainable part of the remainder; empty where it is not known."""
     if found is None:
         return ""
     named = judged.causes != UNKNOWN and judged.decided
@@ -204,7 +206,7 @@ def closable_words(found: Closable | None, judged: Judged) -> str:
 
 
 def _largest(found: Closable, ceilings: Sequence[Ceiling], left: str) -> list[str]:
-    """The share of the kind beside the other kinds' shares, its place, and its formula."""
+    """The share that this kind explains beyond the other kinds, its place, and its formula."""
     kind, where, law = found.kind, found.events, found.law
     best = next(one for one in ceilings if one.kind == kind)
     sentences = [
@@ -247,7 +249,7 @@ _UNKNOWN = 10.0  # standard deviations over the value: neither sign nor order of
 
 
 def formula_line(found: Closable | None, judged: Judged) -> str:
-    """How to try the formula of the remainder, or an effect that one suspects; empty where there is neither."""
+    """How to test the formula of the remainder, or a suspected effect; empty if there is neither."""
     if found is None or found.law is None:
         suspect = "State the suspected effect in a file, and diagnose again with --effects-file."
         return suspect if judged.causes == UNKNOWN and not judged.cycling else ""
@@ -258,7 +260,7 @@ def formula_line(found: Closable | None, judged: Judged) -> str:
 
 
 def _measured_otherwise(kind: str, ceilings: Sequence[Ceiling]) -> list[str]:
-    """The kind that explains more than the named one, on other held-out readings, and why it is not named.
+    """The kind that explains more than the named one on other held-out readings, and why it is not named.
 
     Empty where no kind does.
     """
@@ -293,7 +295,7 @@ _LABEL = "What could explain the residual gap"
 
 
 def closable_line(found: Closable | None, rest: Remainder | None, judged: Judged) -> str:
-    """The part that could be explained, in a line; empty where there is no gap, or it is not known."""
+    """The explainable part, in a line; empty without a gap, or where it is not known."""
     if found:
         return f"{_LABEL}: {found.words}"
     if rest is None or not judged.causes:
@@ -306,9 +308,9 @@ def closable_line(found: Closable | None, rest: Remainder | None, judged: Judged
 
 
 def closable_table(found: Closable | None) -> TextTable:
-    """Share that each kind could explain, in per cent, the named kind first.
+    """Share of the remainder that each kind could explain, in per cent, the named kind first.
 
-    A table without rows where nothing remains beyond chance.
+    A table without rows where the remainder is within chance.
     """
     kind = "" if found is None else found.kind
     ceilings = sorted(found.ceilings if found else (), key=lambda one: one.kind != kind)
@@ -325,7 +327,7 @@ def closable_table(found: Closable | None) -> TextTable:
 
 
 def law_pictures(found: Closable | None, reading: str) -> tuple[Picture, ...]:
-    """The law without a formula; none without one.
+    """The figure of a law without a formula; none with a formula.
 
     Args:
         reading: unit of the readings.
@@ -350,7 +352,7 @@ def law_figure(curve: Curve, reading: str) -> Figure:
     units = freedom_of_unit(reading).shown
     motion, rate = [*units.values()][:2]
     shape = [len(axis) for axis in curve.places]
-    unit, factor = units.get(curve.unit, (curve.unit, 1.0))  # a moment is shown as it is
+    unit, factor = units.get(curve.unit, (curve.unit, 1.0))  # moments keep their unit
     values, std = (factor * np.reshape(given, shape) for given in (curve.values, curve.std))
     name = f"{'error of the reading' if curve.unit == next(iter(units)) else 'missing moment'} [{unit}]"
     axes_by_name = {

@@ -1,4 +1,4 @@
-"""A diagnosis in sections of blocks, from its findings: the content of every face.
+"""A diagnosis in sections of blocks, from its findings: the content of every presentation.
 
 A terminal, ``print``, a notebook and the bench show the sections without their details (`printed`); the report
 shows all of them.
@@ -113,7 +113,7 @@ def _sections(answer: Findings, campaign: Campaign | None, *, blown: bool) -> tu
 
 
 def printed(answer: Findings) -> tuple[Block, ...]:
-    """The blocks of a face without room for details, in order."""
+    """The blocks of a presentation without room for details, in order."""
     return tuple(block for section in sections(answer) for block in brief(section.blocks))
 
 
