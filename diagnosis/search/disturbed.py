@@ -30,7 +30,7 @@ from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
 
-_EARLY = 0.25  # share of a run, within which a disturbance may belong to its release
+_EARLY = 0.25  # share of a run in which a disturbance may belong to its release
 
 
 def prepared_undisturbed(
@@ -40,7 +40,7 @@ def prepared_undisturbed(
     clock: StepClock,
     settings: Settings,
 ) -> tuple[Prepared, GapTest, tuple[Disturbance, ...]]:
-    """As `prepared_and_tested`, without disturbances where there is a gap, and without a run that alone shows it.
+    """As `prepared_and_tested`, without disturbances if there is a gap, and without a run that alone shows it.
 
     Raises:
         TunnelError: when the nominal model cannot be fitted to the runs.
@@ -58,7 +58,7 @@ def prepared_undisturbed(
         try:
             measured = undisturbed(measured, disturbed)
             prepared, test = prepared_of(measured)
-        except TunnelError:  # the others do not determine the model
+        except TunnelError:  # the other runs do not determine the model
             disturbed = tuple(replace(one, kept_until_s=None, used=True) for one in disturbed)
     if not (test.detected or prepared.cut) or any(one.used for one in disturbed):
         return prepared, test, disturbed
@@ -80,13 +80,13 @@ def differs(nominal: Fit, kinds: Sequence[type[Effect]]) -> bool:
 
 
 def together(*found: Sequence[Disturbance]) -> tuple[Disturbance, ...]:
-    """Disturbances of several campaigns, one of each run: the last."""
+    """Disturbances found in several campaigns; for each run the last one."""
     by_run = {one.run: one for several in found for one in several}
     return tuple(by_run[run] for run in sorted(by_run))
 
 
 def disturbances(measured: Campaign, nominal: Fit) -> tuple[Disturbance, ...]:
-    """The disturbed runs, at one rate of false alarms.
+    """The disturbed runs, tested together at one false-alarm rate.
 
     Args:
         measured: the campaign in its own units.
@@ -102,7 +102,7 @@ def disturbances(measured: Campaign, nominal: Fit) -> tuple[Disturbance, ...]:
         return float(clocks[name]) + similarity.own(data.runs[index[name]].start + time, "s")
 
     def kept_from(name: str, time: float) -> float | None:
-        """The clock at that instant, where enough of the run follows; else None."""
+        """The clock at that instant if enough of the run follows; else None."""
         run, frequency = data.runs[index[name]], resonance(nominal, index[name])
         span = run.reading.size * run.interval
         follows = (span - time) * frequency >= DISTURBED_KEPT and time < _EARLY * span
@@ -124,25 +124,26 @@ def disturbances(measured: Campaign, nominal: Fit) -> tuple[Disturbance, ...]:
         at = float(one.time[most])
         last = min(float(one.time[first]), at - 1.0 / frequency)
         kept = clock(name, last) if last * frequency >= DISTURBED_KEPT else None
-        # of a start that is not free, as of a hand that holds the body, the rest is used
+        # a start that is not free, such as a hand that holds the body: the remaining part is used
         begins = None if kept is not None else kept_from(name, at + 1.0 / frequency)
         found[name] = Disturbance(name, clock(name, at), kept, p_value, kept_from_s=begins)
     return tuple(sorted(found.values(), key=lambda one: one.run))
 
 
 def beyond_the_others(runs: Sequence[Jumps], chosen: SelectionSettings) -> list[tuple[str, float]]:
-    """The runs whose greatest jump exceeds chance and the jumps of the others, with the larger p-value.
+    """The runs with a greatest jump beyond chance and beyond the others' jumps; with the larger p-value.
 
-    The logarithms of the greatest jumps are tested for up to a given share of outliers from the outside inwards
-    (generalised ESD; Rosner, Technometrics 25 (1983) 165, doi 10.1080/00401706.1983.10487848), by Student's t of a
-    run among the runs that jump less. Their scatter is estimated with a prior, since few runs do not determine it.
+    The logarithms of the greatest jumps are tested from the outside inwards for up to a given share of outliers
+    (generalised ESD; Rosner, Technometrics 25 (1983) 165, doi 10.1080/00401706.1983.10487848), by Student's t
+    of a run among the runs with smaller jumps. Few runs do not determine the scatter of the jumps, so it has a
+    prior.
     """
     if len(runs) < DISTURBED_FEWEST:
         return []
-    from scipy.special import stdtr  # only here: slow to load
+    from scipy.special import stdtr  # imported here because it is slow to load
 
     instants = sum(one.drop.size for one in runs)
-    # a value below the expected maximum of as many χ² by chance is not a jump
+    # a value below the maximum expected by chance of as many χ² is not a jump
     sizes = np.log([max(float(one.drop.max()), 2.0 * np.log(one.drop.size), 1.0) for one in runs])
     order = np.argsort(-sizes)
     most = min(max(1, int(DISTURBED_SHARE * len(runs))), len(runs) - 2)

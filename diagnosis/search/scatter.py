@@ -1,8 +1,8 @@
 """Chance differences between runs: a layer under every set of causes.
 
-A wind speed, a spring or a damping that differs slightly from run to run is not a cause among others. Under every
-set, every run has its own deviations, with a normal prior of the likeliest width for the set. They are integrated
-out where sets are compared (docs/decisions/0036-runs-that-do-not-repeat.md).
+A wind speed, a spring or a damping that differs slightly from run to run is not a cause among others. Beside
+any set of causes every run has deviations. Their prior is normal, with the most likely width for the set. They
+are integrated out where sets are compared (docs/decisions/0036-runs-that-do-not-repeat.md).
 """
 
 from __future__ import annotations
@@ -29,24 +29,25 @@ WIDTHS_SETTLED: Final = 1.0
 """Drop of −2 ln L above which a fit is repeated with new widths of the scatter, in χ². Convention. A smaller
 change is insignificant."""
 
-_ROUNDS = 3  # of widths and fits
-_REPEATING = 8  # iterations of a fit to runs that repeat: it is close where they do
-_FEWEST = 3  # runs that may differ: one difference gives a width to within a factor of 16 only
-_IN_ORDER = 5  # runs that show an order
+_ROUNDS = 3  # rounds of widths and fits
+_REPEATING = 8  # iterations of a fit to runs that repeat, which starts close
+# minimum number of runs that may differ: one difference gives a width to within a factor of 16 only
+_FEWEST = 3
+_IN_ORDER = 5  # minimum number of runs that show an order
 
-_TOLERANCE = 1e-7  # drop of χ², as a share of it, at which the answer's fit has converged
+_TOLERANCE = 1e-7  # drop of χ², as a share of χ², at which the answer's fit has converged
 
 
 def may_scatter(kinds: Sequence[type[Effect]], data: Data) -> tuple[type[BetweenRuns], ...]:
-    """The differences that the runs could show: at least three runs have the quantity, and a spring."""
+    """The differences that the runs could show: at least three runs have the quantity and a spring."""
     return tuple(kind for kind in data.model.may_scatter(kinds) if data.acts(kind).sum() >= _FEWEST)
 
 
 def with_deviations(problem: Problem, point: Point, scatter: Scatter) -> tuple[Problem, Point]:
-    """A problem with chance differences between runs, and a point of it without any.
+    """A problem with chance differences between runs, and a point of it with all deviations zero.
 
     Args:
-        problem: without such differences.
+        problem: a problem without such differences.
     """
     layered = replace(problem, scatter=scatter)
     first = len(problem.parameters.own) - problem.parameters.of_effects
@@ -67,7 +68,7 @@ def chance(found: Fit, kind: type[BetweenRuns], width: float) -> Chance:
     """A chance difference beside the nominal model as fitted.
 
     Args:
-        width: of the runs' deviations, relative, dimensionless.
+        width: relative width of the runs' deviations, dimensionless.
     """
     run = found.problem.stated(found.point.common, found.point.per_run[0], found.problem.data.runs[0])
     return Chance(kind, width, run.derivatives, run.mechanical_damping)
@@ -79,10 +80,10 @@ def usual(found: Fit, kind: type[BetweenRuns]) -> Chance:
 
 
 def as_stated(found: Fit, kinds: Sequence[type[Effect]]) -> Fit:
-    """A fit whose runs differ as much as the campaign states; unchanged where it states nothing.
+    """A fit with the scatter that the campaign states; unchanged if it states none.
 
     Args:
-        found: a fit whose runs repeat exactly.
+        found: a fit to runs that repeat exactly.
         kinds: the effects that may be named.
     """
     known = found.problem.data.repeatability
@@ -94,10 +95,10 @@ def as_stated(found: Fit, kinds: Sequence[type[Effect]]) -> Fit:
 
 
 def scattered(found: Fit, kinds: Sequence[type[Effect]]) -> Fit | None:
-    """A fit whose runs differ by chance, and more than stated; None where they do not, or the fit fails.
+    """A fit with more scatter than stated; None where the runs do not show it, or the fit fails.
 
     Args:
-        found: a fit whose runs differ as much as stated.
+        found: a fit with the stated scatter.
         kinds: the effects that may be named.
     """
     able = may_scatter(kinds, found.problem.data)
@@ -117,10 +118,10 @@ def scattered(found: Fit, kinds: Sequence[type[Effect]]) -> Fit | None:
 
 
 def differing(fitted: Fit, places: Sequence[int], kinds: Sequence[type[Effect]]) -> Fit | None:
-    """Some runs of a fit, refitted with deviations as wide as they may be; None where they may not differ.
+    """Some runs of a fit, refitted with the widest possible deviations; None where they may not differ.
 
     Args:
-        places: of these runs.
+        places: places of these runs.
         kinds: the effects that may be named.
     """
     problem, point = without_deviations(fitted)
@@ -131,9 +132,10 @@ def differing(fitted: Fit, places: Sequence[int], kinds: Sequence[type[Effect]])
 
 
 def with_own_linear_terms(fitted: Fit, kinds: Sequence[type[Effect]]) -> tuple[Problem, Point] | None:
-    """The problem of a fit with deviations of every run as wide as they may be, at the fit's point.
+    """The problem of a fit with the widest possible deviations of every run, at the fit's point.
 
-    A run then says of an effect only what its spring and damping do not; None where the runs may not differ.
+    A run then determines an effect only by what its spring and damping cannot imitate; None where the runs may
+    not differ.
 
     Args:
         kinds: the effects that may be named.
@@ -145,7 +147,7 @@ def with_own_linear_terms(fitted: Fit, kinds: Sequence[type[Effect]]) -> tuple[P
 def _with_widest(
     problem: Problem, point: Point, fitted: Fit, kinds: Sequence[type[Effect]]
 ) -> tuple[Problem, Point] | None:
-    """A problem without deviations, with the widest ones that its runs may have; None where they have none."""
+    """A problem without deviations, with the widest that its runs may have added; None where they have none."""
     data = problem.data
     able = tuple(usual(fitted, kind) for kind in data.model.may_scatter(kinds) if data.acts(kind).any())
     if not able:
@@ -156,7 +158,7 @@ def _with_widest(
 
 
 def _same_deviations(problem: Problem, point: Point, fitted: Fit) -> Point:
-    """A point with the deviations of a fit, of the numbers that it has."""
+    """A point with the deviations of a fit, for the quantities that both have."""
     names, release = fitted.problem.parameters.own_names, point.per_run.copy()
     for place, name in enumerate(problem.parameters.own_names):
         if name in names:
@@ -165,7 +167,7 @@ def _same_deviations(problem: Problem, point: Point, fitted: Fit) -> Point:
 
 
 def evident(fitted: Fit) -> Fit:
-    """A fit with chance differences where its runs show more than stated; else as stated."""
+    """A fit with chance differences if its runs show more than stated; else as stated."""
     scatter, known = fitted.problem.scatter, fitted.problem.data.repeatability
     if shown := shown_by(fitted):
         widths = fitted.columns.likeliest(width_prior(fitted.problem)).widths
@@ -180,7 +182,7 @@ def evident(fitted: Fit) -> Fit:
 
 
 def shown_by(fitted: Fit) -> tuple[str, ...]:
-    """The unstated chance differences that the runs of a fit show, by name; empty where they repeat."""
+    """Names of the unstated chance differences that the runs of a fit show; empty where the runs repeat."""
     scatter, chosen = fitted.problem.scatter, fitted.settings.scatter
     if not scatter:
         return ()
@@ -192,7 +194,7 @@ def shown_by(fitted: Fit) -> tuple[str, ...]:
 
 
 def _shown(columns: ScatterColumns, prior: WidthPrior, chosen: ScatterSettings) -> Kept:
-    """The numbers in which the runs differ, found by removing the least needed one repeatedly."""
+    """The quantities that differ between the runs; the least needed one is removed repeatedly."""
     kept = np.ones(prior.usual.size, bool)
     while kept.sum() > 1:
         places = np.flatnonzero(kept)
@@ -224,10 +226,10 @@ def drifting(fitted: Fit) -> Between | None:
 
 
 def drifts(fitted: Fit, place: int) -> bool:
-    """Whether the runs differ in one number in proportion to their place, and in no other.
+    """Whether the runs differ in one quantity in proportion to their place, and in no other.
 
     Args:
-        place: of the number among the numbers that differ in the fit.
+        place: place of the quantity among those that differ in the fit.
     """
     columns, prior, chosen = fitted.columns, width_prior(fitted.problem), fitted.settings.scatter
     beside, _ = columns.with_drift(place)
@@ -257,7 +259,7 @@ def _evident(columns: ScatterColumns, prior: WidthPrior, which: Kept, chosen: Sc
 
 
 def _gain(columns: ScatterColumns, prior: WidthPrior, kept: Kept, lost: Kept) -> float:
-    """Drop of −2 ln L by some of the differences beside the others that are kept."""
+    """Drop of −2 ln L by some of the differences beside the remaining ones."""
     whole = columns.likeliest(_held(prior, ~kept))
     without = columns.likeliest(_held(prior, ~kept | lost))
     return without.likeliest.restricted - whole.likeliest.restricted
@@ -270,7 +272,7 @@ def _held(prior: WidthPrior, at_least: Kept) -> WidthPrior:
 
 
 def with_likeliest_widths(fitted: Fit, *, rounds: int = _ROUNDS) -> Fit:
-    """A fit whose widths are the likeliest for its residuals; unchanged where it has no such differences."""
+    """A fit with the most likely widths for its residuals; unchanged if it has no such differences."""
     for _ in range(rounds):
         between = fitted.between
         if between is None:
@@ -287,13 +289,13 @@ def with_likeliest_widths(fitted: Fit, *, rounds: int = _ROUNDS) -> Fit:
 
 
 def likelier(fitted: Fit, repeating: Fit | None = None) -> Fit:
-    """A fit, or the likelier one that starts from runs that repeat exactly.
+    """The given fit, or a more likely fit started from runs that repeat exactly.
 
-    Wide deviations hide much of an effect's change between runs, so a fit from them may end in another minimum.
+    Wide deviations hide most of an effect's change between runs, so a fit from them may end in another minimum.
 
     Args:
-        fitted: a fit whose runs differ by chance.
-        repeating: a fit of the same effects to runs that repeat; None: from the values of the other.
+        fitted: a fit with scatter between its runs.
+        repeating: a fit of the same effects to runs that repeat; None: it starts from the values of ``fitted``.
     """
     if not fitted.problem.scatter:
         return fitted
@@ -304,7 +306,7 @@ def likelier(fitted: Fit, repeating: Fit | None = None) -> Fit:
     least = width_prior(fitted.problem).least
     scatter = tuple(one.as_wide_as(width) for one, width in zip(fitted.problem.scatter, least, strict=True))
     start = fit_at(*with_deviations(repeating.problem, repeating.point, scatter))
-    # no form is exact, and its error between runs needs narrow deviations
+    # no form is exact: its errors between runs look like narrow deviations
     if start.between is None or not start.between.likelihood < fitted.unlikelihood:
         return fitted
     again = try_fit(with_widths(start.problem, start.between), start.point)
