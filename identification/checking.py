@@ -1,4 +1,4 @@
-"""`check_estimator`: whether your own estimator keeps the rules on which identify, scores and sweeps rely.
+"""`check_estimator`: whether your own estimator follows the rules on which identify, scores and sweeps rely.
 
 The campaigns are of the nominal model in closed form, with white noise. The accuracy of the values is not judged
 here: ``tunnel score`` measures it. Wrong units and far too small deviations are found.
@@ -35,17 +35,20 @@ _CONDITIONS = tuple(
     (spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 12.0, 24.0)
 )  # N m/rad, m/s
 _FAR = (
-    0.2  # of the truth: a wrong unit (a factor of 2π, 57, 60 or 100) is further off, a crude method is nearer
+    # share of the truth: a wrong unit (a factor of 2π, 57, 60 or 100) is further off, a crude method is
+    # nearer
+    0.2
 )
-_DEVIATIONS = 6.0  # standard deviations that a value may be off in addition
-_FALSE_ALARMS = 1e-4  # for a right estimator, over all tests of its deviations together
-_REPEATS = 10  # campaigns with different noise
-_SAME = 1.0  # standard deviations between answers to the same runs in another order, or with the other sign
+_DEVIATIONS = 6.0  # standard deviations by which a value may be off in addition
+_FALSE_ALARMS = 1e-4  # false-alarm rate for a right estimator, over all tests of its deviations together
+_REPEATS = 10  # number of campaigns with different noise
+# maximum difference, in standard deviations, between answers for reordered runs, or with the sign inverted
+_SAME = 1.0
 
 
 @dataclass(frozen=True)
 class _Subject:
-    """The estimator under test, with comparisons of its answer with the rules."""
+    """The estimator under test, with checks of its answers against the rules."""
 
     estimator: Estimator
 
@@ -53,7 +56,7 @@ class _Subject:
         return TunnelError(what, where=f"estimator {self.estimator.name}", remedy=remedy)
 
     def estimate(self, campaign: Campaign, of: str) -> Estimate:
-        """Its estimate, after checking the rules of every answer.
+        """The estimator's answer, after checking the rules for every answer.
 
         Args:
             of: the kind of campaign, for messages.
@@ -120,12 +123,12 @@ def check_estimator(estimator: str | Estimator | type[Any], *, free_decays: bool
     runs, in another order and with the other sign; its failures must be statuses; and it must not change its input.
 
     Args:
-        estimator: its name, an object, or a class that needs no arguments.
-        free_decays: False where it takes driven runs only.
+        estimator: name, object, or class that needs no arguments.
+        free_decays: False if the estimator takes driven runs only.
 
     Raises:
-        TunnelError: for the first broken rule; the text says what to do. The traceback of an exception of the
-            estimator is a note of the error.
+        TunnelError: for the first broken rule; the text says what to do. If the estimator raised an exception,
+            its traceback is a note of the error.
     """
     subject = _Subject(_made(estimator))
     driven = takes_driven(subject.estimator)
@@ -162,7 +165,7 @@ def _made(estimator: object) -> Estimator:
 
 
 def _check_values(subject: _Subject) -> None:
-    """Units and deviations: values near the truth, and equal ones for the same runs."""
+    """Units and deviations: values are near the truth, and equal for the same runs."""
     campaign = _campaign()
     found = subject.estimate(campaign, "noisy runs")
     truths = _truths()

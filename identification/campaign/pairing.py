@@ -40,9 +40,9 @@ class PairedRun:
 
     Args:
         frequency: damped, Hz.
-        frequency_std: its standard deviation, Hz.
+        frequency_std: standard deviation of the frequency, Hz.
         rate: decay rate σ = ζωn, 1/s.
-        rate_std: its standard deviation, 1/s.
+        rate_std: standard deviation of the rate, 1/s.
     """
 
     run: Run
@@ -138,11 +138,11 @@ def _filled(
     campaign: Campaign,
     scatter: ScatterFit | None,
 ) -> Estimate:
-    """The estimate, with its wind-off line, with the coefficients and the air of its runs.
+    """The estimate with its wind-off line, the coefficients and the aerodynamic terms of its runs.
 
     The deviations of f and σ are propagated one input at a time (Kragten, Analyst 119 (1994) 2161–2165, doi
-    10.1039/AN9941902161), and so are the runs' deviations where scatter between runs counts. Where it does not,
-    the scatter over the wind-on runs or of the springs is used if it is larger.
+    10.1039/AN9941902161). The runs' own deviations are propagated too if scatter between runs counts. If it
+    does not, the scatter over the wind-on runs or of the springs is used where it is larger.
     """
     rig = campaign.rig
     inertia, count = estimate.wind_off_inertia, len(pairing.on)
@@ -241,7 +241,7 @@ class Paired(ABC):
         if windy and not has_size(campaign.rig):
             statuses.add(Status.NO_REFERENCE_SIZE)
         seen = [one for one, _ in sprung]
-        scatter = None  # computed as for every method
+        scatter = None  # computed in the same way for every method
         if pairing.off and all(one.gained is not None for one in seen):
             scatter = LinkedRuns.of(
                 campaign, [None if one is None else one.gained for _, one in found]

@@ -1,10 +1,10 @@
 """Hilbert envelope: decay rate from the logarithm of the envelope, frequency from the phase.
 
-The analytic signal of a finite record is wrong near its ends. So the record is first extended past both ends by a
-few cycles of an approximate decay that fades out. The envelope is demodulated with a fixed frequency and averaged
-over half cycles: the averages of a decay are again an exponential sequence, with independent errors of √2 S/(√m A)
-in logarithm and phase alike for m samples. Where a line does not fit a run, its standard deviations are raised to
-the scatter about it.
+The analytic signal of a finite record is wrong near its ends. The record is therefore first extended past both
+ends by a few cycles of an approximate decay that fades out. The envelope is demodulated with a fixed frequency
+and averaged over half cycles. The averages of a decay are again an exponential sequence; for m samples their
+logarithms and phases have independent errors of √2 S/(√m A). Where a line does not fit a run, its standard
+deviations are raised to the scatter about it.
 
 Sources: M. Feldman, Mech. Syst. Signal Process. 25 (2011) 735–802, doi 10.1016/j.ymssp.2010.07.018 (free decay by
 the Hilbert transform, and its end effects); backbone from free decays: J. M. Londoño, S. A. Neild & J. E. Cooper,
@@ -33,7 +33,7 @@ from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.quantities import Angles
 from tunnel_sim.vocabulary.record import Array
 
-_CARRIED_ON = 6.0  # cycles past either end
+_CARRIED_ON = 6.0  # cycles beyond either end
 _GROWTH = 3.0  # a fast decay is extended backwards only until it has grown by e³
 
 
@@ -42,7 +42,7 @@ class Envelope:
     """Half-cycle averages of the demodulated analytic signal.
 
     Args:
-        time: their middles since the first sample, shape (n,), s.
+        time: middles of the half cycles since the first sample, shape (n,), s.
         phase: relative to the carrier, unwrapped, shape (n,), rad.
         carrier: the demodulating angular frequency, rad/s.
     """
@@ -58,10 +58,10 @@ def envelope(reading: Reading, rough: RunFit, zero: float) -> Envelope:
     """Envelope and phase of a record: at least one average per half cycle.
 
     Args:
-        rough: an approximate decay of the record, with its initial state; it must oscillate.
-        zero: the sensor's, rad.
+        rough: an oscillating approximate decay of the record, with its initial state.
+        zero: the sensor's zero, rad.
     """
-    from scipy.signal import hilbert  # only here: slow to load
+    from scipy.signal import hilbert  # imported here because it is slow to load
 
     reading = even_reading(reading)
     interval = float(reading.time[-1]) / (reading.time.size - 1)
@@ -84,7 +84,7 @@ def envelope(reading: Reading, rough: RunFit, zero: float) -> Envelope:
     return Envelope(middles, np.abs(means), np.unwrap(np.angle(means)), omega, block)
 
 
-_PASSES = 3  # each extends the record with the decay of the previous one
+_PASSES = 3  # each round extends the record with the decay of the previous one
 _LEAST_POINTS = 5
 
 

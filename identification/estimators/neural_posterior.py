@@ -3,8 +3,8 @@
 In windows of envelope and phase, the nominal model and each of many rivals is a linear fit
 (`identification.neural.rivals`). Values are medians of the mixture with the network's weights, with its 95 %
 intervals; the standard deviation is the interval's width over 3.92. ζ and ωn are values at small amplitude, and
-Cnβ, Cnr, Izz and Cr the linear coefficients, whatever effects act. Records
-unlike all training are refused, and campaigns that state a scatter between runs.
+Cnβ, Cnr, Izz and Cr the linear coefficients, whatever effects act. The estimator refuses records unlike its
+training, and campaigns that state a scatter between runs.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class _DemodulatedRun:
 
     @property
     def slow(self) -> float:
-        """Variance of envelope and phase over the one by noise within the windows; 1 where they agree."""
+        """Variance of envelope and phase, over the variance due to noise within the windows; 1 where they agree."""
         return max(float(self.alone.remaining[0]) / self.alone.freedom, 1.0) if self.departs else 1.0
 
     @property
@@ -85,8 +85,8 @@ class NeuralPosterior:
     """Posterior medians and intervals by a trained network.
 
     Args:
-        weights: a safetensors file written by ``tunnel train --estimator neural_posterior``; the packaged weights
-            where None.
+        weights: a safetensors file written by ``tunnel train --estimator neural_posterior``; None: the packaged
+            weights.
     """
 
     name = "neural_posterior"
@@ -194,7 +194,7 @@ def _described(seen: _DemodulatedRun, sensor: SensorProperties) -> RunEstimate:
         tolerance = MISFIT_DEVIATIONS * float(np.hypot(NOISE_TOLERANCE, own))
         disagrees = stated > 0.0 and abs(std / stated - 1.0) > tolerance
     noise = NoiseLevel(std, "residual", std, seen.slow, departs, disagrees)
-    if departs:  # coloured noise is no departure
+    if departs:  # coloured noise is not a departure
         check = residual_check(seen.run, Decay(rate, omega**2 + rate**2), sensor)
         noise = noise if check is None or check.colour is None else check.noise
     zeta, omega_n = (seen.posterior.quantity(place, unit) for place, unit in enumerate(("1", "rad/s")))

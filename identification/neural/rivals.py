@@ -22,11 +22,11 @@ from tunnel_sim.vocabulary.record import Array
 
 Mask = NDArray[np.bool_]
 
-_ANY = (-1.0, -0.5, 0.5, 1.0, 2.0, 4.0)  # all but the linear one
+_ANY = (-1.0, -0.5, 0.5, 1.0, 2.0, 4.0)  # every exponent except the linear one
 _OFFSETS = (0.0, -0.35)  # powers of the speed in an error of the speed
-_LAGS = (-0.3, 0.2, 0.8)  # of the air's moment, l/V
+_LAGS = (-0.3, 0.2, 0.8)  # lags of the air's moment, in l/V
 SPRINGS = 4
-"""Number of different springs, from the softest, that each have a rival of their own."""
+"""Number of different springs, from the softest, with a separate rival each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class RivalConditions:
         stiffness_load: ½ρV²·A·l, shape (runs,), N m; 0 with the wind off.
         damping_load: ½ρV·A·l², shape (runs,), N m s; 0 with the wind off.
         speed: V as a ratio to the largest of the campaign, shape (runs,); 0 with the wind off.
-        spring: number of the spring in the campaign, from the softest, shape (runs,).
+        spring: index of the spring in the campaign, from the softest, shape (runs,).
         air: Cnβ and Cnr of the nominal fit, 1/rad; 0 where they are not determined.
     """
 
@@ -51,7 +51,7 @@ class RivalConditions:
 
     @classmethod
     def of(cls, runs: Sequence[Run], design: Design, air: tuple[float, float]) -> RivalConditions:
-        """Conditions of runs that the design links, each with its spring."""
+        """Conditions of the runs that the design links, each with its spring."""
         springs = np.array([run.spring_stiffness for run in runs], dtype=np.float64)
         speeds = np.array([run.wind_speed for run in runs])
         speeds = speeds / max(float(speeds.max()), 1e-300)
@@ -60,7 +60,7 @@ class RivalConditions:
 
 
 def _readings(w: RivalWindows) -> list[Column]:
-    """A reading whose amplitude or phase depends on the amplitude."""
+    """A reading with an amplitude or phase that depends on the amplitude."""
     logarithms = [(w.powers[power], None) for power in (-1.0, 2.0, 4.0)]
     return [*logarithms, *((None, w.powers[power]) for power in (-1.0, 2.0))]
 
@@ -123,7 +123,7 @@ def campaign_columns(w: RivalWindows, c: RivalConditions) -> Array:
 
 
 def best_step(run: Demodulated, values: Array) -> Array:
-    """The step, from 0 to 1, beside a straight line, that lowers χ² most, shape (w,).
+    """The step, from 0 to 1, added to a straight line, that lowers χ² most, shape (w,).
 
     Args:
         values: logarithm or phase, shape (w,), dimensionless.
@@ -143,7 +143,7 @@ def best_step(run: Demodulated, values: Array) -> Array:
 SETS = (2, 3, 4)
 """Numbers of columns in the larger rivals, found by forward selection; one more rival has all columns."""
 MORE = len(SETS) + 2
-"""Rivals besides the ones of one column: the nominal model first; the sets and all columns together last."""
+"""Rivals in addition to those with one column: the nominal model first; the sets and all columns together last."""
 _PRIOR = 1e-6  # variance of a column's own fit over the prior variance of its effect: 1000 deviations
 _PRIOR_ALL = 1e-3  # the same ratio where all columns act together
 
@@ -153,9 +153,9 @@ class Rivals:
     """The nominal model and its rivals, nominal first.
 
     Args:
-        parameters: of the nominal model, shape (p,).
+        parameters: parameters of the nominal model, shape (p,).
         shifts: contribution of each rival to them, shape (r, p).
-        covariances: of the parameters under each rival, shape (r, p, p).
+        covariances: covariance of the parameters under each rival, shape (r, p, p).
         scores: signed significance of a rival's column, shape (r,); for a set, the root of its fall of χ².
         own: share of a column that the nominal parameters cannot imitate, shape (r,).
         remaining: χ² of each rival, shape (r,).
@@ -175,13 +175,13 @@ class Rivals:
 def fit_rivals(values: Array, design: Array, columns: Array, weights: Array, taken: int) -> Rivals | None:
     """Fit the nominal model and every rival; None where the data do not determine the nominal parameters.
 
-    A weak normal prior on every column keeps the parameters finite where it is nearly a combination of the
-    nominal ones.
+    A weak normal prior on every column keeps the parameters finite if the column is nearly a combination of the
+    nominal columns.
 
     Args:
         values: data, shape (n,).
         design: columns of the nominal parameters, shape (n, p).
-        columns: of the rivals, shape (n, c); zero where a rival does not apply.
+        columns: columns of the rivals, shape (n, c); zero where a rival does not apply.
         weights: inverse variances, shape (n,).
         taken: number of unknowns eliminated beforehand.
     """
@@ -255,9 +255,9 @@ def forward_selection(gram: Array, aim: Array, number: int) -> list[int]:
 RECORD_NAMES = ("zeta", "omega_n")
 CAMPAIGN_NAMES = PARAMETERS
 LEVEL = 2
-"""Column of a rival's features: the logarithm of its χ² over the freedom, and a little."""
+"""Column of a rival's features: the logarithm of its χ² over the freedom, plus a small constant."""
 OWN = 20
-"""Features of a run besides the significance of its rivals."""
+"""Features of a run in addition to the significance of its rivals."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,10 +270,11 @@ class Features:
     Args:
         rivals: features of each rival, shape (r, f).
         runs: features of each run, shape (n, k); the last one is 1 with the wind on, else 0.
-        shifts: of the quantities under each rival, in standard deviations, shape (r, d); 0 where not determined.
-        covariances: of the quantities under each rival, in the same unit, shape (r, d, d).
-        values: of the quantities in the nominal fit, SI, shape (d,).
-        stds: their standard deviations, SI, shape (d,); 1 where not determined.
+        shifts: shifts of the quantities under each rival, in standard deviations, shape (r, d); 0 where not
+            determined.
+        covariances: covariances of the quantities under each rival, in the same unit, shape (r, d, d).
+        values: values of the quantities in the nominal fit, SI, shape (d,).
+        stds: standard deviations of the values, SI, shape (d,); 1 where not determined.
         known: which quantities are determined, shape (d,).
     """
 
@@ -319,7 +320,7 @@ def record_features(runs: Sequence[Demodulated]) -> list[tuple[Features, Rivals]
 def campaign_features(
     runs: Sequence[Run], seen: Sequence[Demodulated], design: Design, alone: Sequence[Rivals]
 ) -> Features | None:
-    """Features of a campaign, for Cnβ, Cnr, Izz and Cr; None where the runs do not determine any coefficient."""
+    """Features of a campaign, for Cnβ, Cnr, Izz and Cr; None if the runs do not determine any coefficient."""
     # The windows' own decays are added to their deviations.
     parts, blocks = [], []
     for decay, link in zip(seen, design.links, strict=True):
