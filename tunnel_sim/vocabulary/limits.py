@@ -1,7 +1,7 @@
 """Limits on reading, expansion and simulation, each with its reason; docs/reference/limits.md lists them.
 
-Each limit is far above the records of rigs, and low enough that no input fills 2 GiB of memory or runs for hours
-unexpectedly. The simulator and the readers use the same limits, so every written file can be read.
+Each limit is far above the records of rigs, and low enough that no input fills 2 GiB of memory or runs for
+hours unexpectedly. The simulator and the readers use the same limits, so every written file can be read.
 """
 
 from __future__ import annotations

@@ -102,7 +102,7 @@ def _visit_members(value: Mapping[str, Any], path: str, found: _Found) -> None:
         matrix = isinstance(member, list) and member and all(isinstance(row, list) for row in member)
         if names is not None and matrix and all(len(row) == len(names) for row in member):
             _visit_list([dict(zip(names, row, strict=True)) for row in member], below, found)
-        elif isinstance(value.get("name"), str) and arrays == [key]:  # a channel that describes itself
+        elif isinstance(value.get("name"), str) and arrays == [key]:  # a channel with its own description
             group = path.rpartition("/")[0]
             own = f"{group}/{value['name']}" if group else value["name"]
             _visit(member, own, found)
@@ -126,13 +126,13 @@ def _visit_list(value: Sequence[Any], path: str, found: _Found) -> None:
     elif value and all(isinstance(row, dict) and _is_flat(row) for row in value):
         _visit_records(value, path, found)
     else:
-        # Members of the group above: channels that describe themselves, or a group for each run.
+        # members of the group above: channels with their own descriptions, or a group for each run
         for i, member in enumerate(value, 1):
             _visit(member, f"{path}[{i}]" if not _describes_itself(member) else f"{path}/{i}", found)
 
 
 def _visit_records(rows: Sequence[Mapping[str, Any]], path: str, found: _Found) -> None:
-    """Records of the same members: a column for each member."""
+    """Records with equal members: a column for each member."""
     names = list(dict.fromkeys(name for row in rows for name in row))
     series = []
     for name in names:
@@ -154,7 +154,7 @@ def _visit_records(rows: Sequence[Mapping[str, Any]], path: str, found: _Found) 
 
 
 def _in_stated_unit(table: Table, found: _Found) -> Table:
-    """A table whose one reading without a unit has the unit stated by its group, or the document."""
+    """A table with one reading without a unit; it takes the unit stated by its group, or the document."""
     unit = found.stated.get(table.part) or found.stated.get("", "")
     bare = [c for c in table.channels if not c.unit and not names_a_time(c.name) and not names_runs(c.name)]
     if kind_of(unit) in ("", "time") or len(bare) != 1:
