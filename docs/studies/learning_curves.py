@@ -45,26 +45,26 @@ FREE_DECAY: dict[str, Any] = {
     "noise_std": 0.005,
     "prior": {"cn_beta": 0.03, "cn_r": 0.03},
 }
-"""A run of 200 control periods, some seven in a cycle; by default it has 1000. The derivatives are known to 0.03
-from an earlier campaign. With the default prior, which knows next to nothing, the first half second gives most of
-the reward whatever the agent does, and hides what its actions add."""
+"""A run of 200 control periods, with some seven in a cycle; by default it has 1000. The derivatives are known
+to 0.03 from an earlier campaign. With the default prior, which is very wide, the first half second gives most
+of the reward whatever the agent does, and hides the contribution of its actions."""
 SETTINGS: dict[str, Any] = {
-    "n_steps": 200,  # a run
+    "n_steps": 200,  # one run
     "batch_size": 400,
     "gamma": 0.98,  # 50 control periods, 2.5 s: the wind follows its set-point in 2 s
     "ent_coef": 0.0,
     "learning_rate": 1e-3,
     "policy_kwargs": {"net_arch": [64, 64], "log_std_init": -0.5},
 }
-"""Of PPO for ``FreeDecay-v0``, where they differ from those of the stored agent."""
-RUNS = 16  # in parallel
+"""Settings of PPO for ``FreeDecay-v0`` that differ from the stored agent's."""
+RUNS = 16  # number of runs in parallel
 SEEDS = (0, 1)
 SWING = radians(20.0)  # rad, amplitude of the hand-written policy
 SPEEDS = (
     25.0,
     40.0,
 )  # m/s, wind speeds of the hand-written policy; the second is the limit, which the agent has too
-SHARE = 0.5  # of the spring's stiffness that the air may take at the speed that the policy sets by the spring
+SHARE = 0.5  # share of the spring's stiffness that the air may take at the speed chosen for the spring
 CURVES = ("FreeDecay-v0", "Campaign-v0")
 LENGTHS = {"FreeDecay-v0": 150_000, "Campaign-v0": 32_000}
 """Steps of each training: control periods, and runs."""
@@ -81,11 +81,11 @@ class Point:
 
     Args:
         policy: ``trained``, or a policy for comparison.
-        seed: of the training; 0 for a policy for comparison.
-        steps: of the training so far; 0 for a policy for comparison.
+        seed: seed of the training; 0 for a policy for comparison.
+        steps: steps of the training so far; 0 for a policy for comparison.
         nats: mean return of the episodes, nats.
-        std_error: of the mean, from the scatter between the episodes, nats.
-        episodes: their number.
+        std_error: standard error of the mean, from the scatter between the episodes, nats.
+        episodes: number of episodes.
     """
 
     environment: str
@@ -109,8 +109,8 @@ def play_runs(act: Callable[[Array], Array], begin: Callable[[dict[str, Any]], N
     """The returns of runs of ``FreeDecay-v0``, nats, shape (n,).
 
     Args:
-        act: actions, shape (n, 2), from observations, shape (n, p).
-        begin: called with the stated conditions, each shape (n,).
+        act: function from observations, shape (n, p), to actions, shape (n, 2).
+        begin: function called with the stated conditions, each of shape (n,).
     """
     count = EPISODES["FreeDecay-v0"]
     envs = gymnasium.make_vec("tunnel_sim/FreeDecay-v0", num_envs=count, nthread=1, **FREE_DECAY)
@@ -130,7 +130,7 @@ def play_campaigns(act: Callable[[Any], Any]) -> Array:
     """The returns of campaigns of ``Campaign-v0``, nats less rig time, shape (n,).
 
     Args:
-        act: the action in an environment during an episode.
+        act: function that gives the action in an environment during an episode.
     """
     env = gymnasium.make("tunnel_sim/Campaign-v0")
     returns = np.zeros(EPISODES["Campaign-v0"])

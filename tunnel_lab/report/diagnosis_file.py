@@ -29,11 +29,11 @@ def read_diagnosis(path: Path) -> Diagnosis:
 
 
 def diagnosis_of(document: Mapping[str, Any], where: str, remedy: str) -> Diagnosis:
-    """The diagnosis of a document, as `Diagnosis.from_json_dict`, whose values can be shown.
+    """The diagnosis in a document, as from `Diagnosis.from_json_dict`, with a check that its values can be shown.
 
     Args:
-        where: the document is from, in an error.
-        remedy: in an error.
+        where: source of the document, for an error.
+        remedy: remedy, for an error.
 
     Raises:
         TunnelError: when it is not the document of a diagnosis.
