@@ -43,8 +43,8 @@ class Status(Enum):
         "a limit cycle, which has no damping ratio: record its growth, or a decay at a lower wind speed"
     )
     AMBIENT_VIBRATION = (
-        "ambient vibration: the motion comes and goes as under a random moment, and a decay fitted to it "
-        "does not have its damping: use -e filter_error"
+        "ambient vibration: the motion comes and goes as under a random moment, and a fitted decay "
+        "does not give its damping: use -e filter_error"
     )
     FREQUENCY_CHANGES = (
         "the frequency changes so much along the decay, as in a pendulum, that no single omega_n and zeta describe "

@@ -55,7 +55,7 @@ _DOUBTS: Mapping[str, Callable[[float], str]] = {
     ),
     "patched": lambda found: f"{_little(found)} of the gap when written into the model and simulated",
     "under load": lambda found: (
-        f"leaves {share(found)} of the gap, as friction under load does where it follows another law"
+        f"leaves {share(found)} of the gap: friction under load may follow another law"
     ),
     "left": lambda found: f"leaves a residual of {share(found)} of the swing",
     "elsewhere": lambda _: "the residuals point elsewhere",

@@ -213,8 +213,8 @@ def remaining(fit: Fit, runs: list[RunData], angle: float) -> Array:
         angle: release angle, rad.
 
     Returns:
-        By number of equal runs as in `_COUNTS`, run and coefficient, shape (counts, runs, coefficients); 1 where a
-        run cannot be integrated.
+        Ratios, shape (counts, runs, coefficients); counts as in `_COUNTS`. A ratio is 1 if its run cannot be
+        integrated.
     """
     problem, own = _planned(fit, tuple(runs), angle)
     found = sensitivities(problem, Point(fit.point.common, np.tile(own, (len(runs), 1))))

@@ -281,7 +281,7 @@ def where_pictures(where: Where, maps: Maps | None) -> tuple[Picture, ...]:
             "where-profiles",
             "Excess of all runs together over time and over amplitude, in the frequency bands that show the "
             "gap. Grey: the level of noise alone, within three standard deviations. Yellow: the shortest "
-            "interval with four fifths of the gap. Missing moment: the share of its energy by time. It "
+            "interval with 80 % of the gap. Missing moment: the share of its energy by time. It "
             "shows when a moment acts, and so locates a blow.",
             "Excess against time and against amplitude, and the missing moment against time.",
             partial(profiles_figure, where, maps),
@@ -289,7 +289,7 @@ def where_pictures(where: Where, maps: Maps | None) -> tuple[Picture, ...]:
         Picture(
             "where-spectrum",
             "Residual power over noise power, by frequency. Grey: the level of noise alone, within three "
-            "standard deviations. In print, yellow: the shortest interval with four fifths of the gap; dark "
+            "standard deviations. In print, yellow: the shortest interval with 80 % of the gap; dark "
             "bar on the axis: the natural frequencies of the runs.",
             "Residual power against frequency, with the nominal model and with the causes added.",
             partial(spectrum_figure, where, maps.frequency),

@@ -415,8 +415,8 @@ class NominalModel:
             )
         elif len(speeds) == _TOLD_BY:
             found.append(
-                "a wind-speed offset as opposed to a dependence of Cnβ on the speed, but by the damping: there are "
-                "two wind speeds only"
+                "a wind-speed offset as opposed to a dependence of Cnβ on the speed, except by the damping: there are "
+                "only two wind speeds"
             )
         if self.windy and not data.in_still_air:
             found.append("whether an effect is mechanical or aerodynamic: there is no run with the wind off")
@@ -425,7 +425,7 @@ class NominalModel:
             found.append("how well runs repeat: a single run shows no scatter between runs")
         elif _OF_A_DECAY * len(data.runs) <= len(common) and not data.driven:
             found.append(
-                "how well runs repeat: no run tests another one, and ± is for runs that repeat exactly"
+                "how well runs repeat: no two runs can be compared, and ± assumes runs that repeat exactly"
             )
         last = (_OF_WIND,) if self.windy else ()
         if data.driven:
