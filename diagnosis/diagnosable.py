@@ -120,10 +120,10 @@ def choose(
     Raises:
         TunnelError: when the examination refuses the records, or a run shows no motion that can be diagnosed.
     """
-    found = diagnosable(campaign, judged=judged)
-    if not found.limit_cycles:
-        refuse_motionless(found.campaign, nominal_model(found.campaign, given))
-    compared, left_out = comparable_runs(found.campaign)
+    usable = diagnosable(campaign, judged=judged)
+    if not usable.limit_cycles:
+        refuse_motionless(usable.campaign, nominal_model(usable.campaign, given))
+    compared, left_out = comparable_runs(usable.campaign)
     model = nominal_model(compared, given)
     if compared.sensor.derivative:
         # the sizes and ranges of these effects are angles; a mode moves the body
@@ -132,8 +132,8 @@ def choose(
         left_out = (*left_out, Fact(tried, {"quantity": compared.sensor.quantity}))
     kinds, said_of_drive = kinds_for(compared, kinds, model)
     left_out = (*left_out, *map(as_stated, (*said_of_drive, *model.notes())))
-    known = () if found.limit_cycles else kinds
-    return Chosen(found.campaign, compared, model, known, found.remarks, left_out, found.limit_cycles)
+    known = () if usable.limit_cycles else kinds
+    return Chosen(usable.campaign, compared, model, known, usable.remarks, left_out, usable.limit_cycles)
 
 
 def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[Fact, ...]]:
@@ -147,22 +147,22 @@ def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[Fact, ...]]:
     stated = [run for run in campaign.runs if run.spring_stiffness is not None]
     bare = [run for run in campaign.runs if run.spring_stiffness is None]
     left_out = []
-    kept, derivative = stated if len(stated) >= len(bare) else bare, campaign.sensor.derivative
+    compared, derivative = stated if len(stated) >= len(bare) else bare, campaign.sensor.derivative
     if stated and bare:
-        other, why = (bare, "stiffness not stated") if kept is stated else (stated, "stiffness stated")
+        other, why = (bare, "stiffness not stated") if compared is stated else (stated, "stiffness stated")
         left_out.append(Fact(why, {"runs": [run.id for run in other]}))
-    if kept is bare:
+    if compared is bare:
         same = _of_one_spring(bare, derivative, SAME_SPRING)
         if len(same) < len(bare):
             left_out.append(Fact("other springs", {"runs": [run.id for run in bare if run not in same]}))
-        kept = same
+        compared = same
     still: dict[float | None, list[float]] = defaultdict(list)
-    for run in kept:
+    for run in compared:
         if not run.wind_on:
             still[run.spring_stiffness].append(free_frequency(run, derivative))
     elsewhere = [
         run
-        for run in kept
+        for run in compared
         if run.wind_on
         and run.spring_stiffness in still
         and free_frequency(run, derivative) > OTHER_MODE * median(still[run.spring_stiffness])
@@ -170,8 +170,8 @@ def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[Fact, ...]]:
     if elsewhere:
         figures = {"ratio": OTHER_MODE, "runs": [run.id for run in elsewhere]}
         left_out.append(Fact("another mode", figures))
-        kept = [run for run in kept if run not in elsewhere]
-    order = {run.id for run in kept}
+        compared = [run for run in compared if run not in elsewhere]
+    order = {run.id for run in compared}
     return replace(campaign, runs=tuple(run for run in campaign.runs if run.id in order)), tuple(left_out)
 
 
@@ -193,18 +193,18 @@ def _of_one_spring(runs: Sequence[Run], derivative: int, ratio: float) -> list[R
     groups: list[list[list[Run]]] = []
     for alike in by_speed.values():
         ranked = sorted(alike, key=lambda pair: pair[0])
-        found = [[ranked[0][1]]]
+        clusters = [[ranked[0][1]]]
         for (last, _), (now, run) in itertools.pairwise(ranked):
             if now > ratio * last:
-                found.append([])
-            found[-1].append(run)
-        groups.append(found)
-    counts = {len(found) for found in groups}
+                clusters.append([])
+            clusters[-1].append(run)
+        groups.append(clusters)
+    counts = {len(clusters) for clusters in groups}
     if counts == {1}:
         return list(runs)
     if len(counts) == 1:
         return max(([run for group in rank for run in group] for rank in zip(*groups, strict=True)), key=len)
-    return max((group for found in groups for group in found), key=len)
+    return max((group for clusters in groups for group in clusters), key=len)
 
 
 def without_short(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:

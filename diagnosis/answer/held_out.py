@@ -125,7 +125,7 @@ def _held_out(whole: Fit) -> HeldOut:
         seen = [np.full(run.reading.size, run.id not in group) for run in data.runs]
         try:
             common = fit_seen(whole, seen)[0].common
-            released, left = refit_releases(
+            released, remaining = refit_releases(
                 replace(whole.problem, data=data.subset(tuple(ids[i] for i in out))),
                 Point(common, whole.point.per_run[out]),
                 [whole.jacobian[i][1] for i in out],
@@ -133,7 +133,7 @@ def _held_out(whole: Fit) -> HeldOut:
         except (FitError, np.linalg.LinAlgError):
             continue
         for k, i in enumerate(out):
-            residuals[ids[i]] = left[k]
+            residuals[ids[i]] = remaining[k]
             points[ids[i]] = (released.common, released.per_run[k])
     return HeldOut(residuals, points)
 
@@ -170,19 +170,19 @@ def predict_stretches(whole: Fit, turns: Turns) -> dict[str, Array]:
             predicted by the fit that did not use it, unless that fit failed.
     """
     runs = whole.problem.data.runs
-    found = {
+    predicted = {
         run.id: r.copy() for run, r, turn in zip(runs, whole.residuals, turns, strict=True) if turn[0] >= 0
     }
-    for number in range(FOLDS if found else 0):
+    for number in range(FOLDS if predicted else 0):
         out = [turn == number for turn in turns]
         try:
-            _, residuals = fit_seen(whole, [~left for left in out])
+            _, residuals = fit_seen(whole, [~held_out for held_out in out])
         except np.linalg.LinAlgError:
             continue
-        for run, residual, left in zip(runs, residuals, out, strict=True):
-            if left.any():
-                found[run.id][left] = residual[left]
-    return found
+        for run, residual, held_out in zip(runs, residuals, out, strict=True):
+            if held_out.any():
+                predicted[run.id][held_out] = residual[held_out]
+    return predicted
 
 
 def share_ahead(study: Study, whole: Collection[str]) -> float | None:
@@ -204,19 +204,19 @@ def share_ahead(study: Study, whole: Collection[str]) -> float | None:
     ahead = [run.id in driven.difference(whole) for run in runs]
     if not study.named or study.moment is not None or chosen is nominal or not any(ahead):
         return None
-    seen = [
+    earlier = [
         np.arange(run.reading.size) < (run.reading.size // 2 if later else run.reading.size)
         for run, later in zip(runs, ahead, strict=True)
     ]
-    left = []
+    predicted = []
     for fitted in (nominal, chosen):
         try:
-            _, residuals = fit_seen(fitted, seen)
+            _, residuals = fit_seen(fitted, earlier)
         except np.linalg.LinAlgError:
             return None if fitted is nominal else 0.0
-        left.append(np.concatenate([r[~known] for r, known in zip(residuals, seen, strict=True)]))
-    before, after = (float(np.mean(one**2)) for one in left)
-    if chdtrc(left[0].size, left[0].size * before) >= study.settings.answer.remains_rate:
+        predicted.append(np.concatenate([r[~known] for r, known in zip(residuals, earlier, strict=True)]))
+    before, after = (float(np.mean(one**2)) for one in predicted)
+    if chdtrc(predicted[0].size, predicted[0].size * before) >= study.settings.answer.remains_rate:
         return None
     return share_closed(before - 1.0, after - 1.0) if np.isfinite(after) else 0.0
 
@@ -285,19 +285,19 @@ class Subsets:
             own = None if answer is None or answer.moment is not None else answer.hypothesis
             if own is None:
                 start = restricted(self._study.chosen, key)
-                found = try_fit(
+                refitted = try_fit(
                     start.problem, start.point, base=start, tolerance=1e-3, max_iterations=_ITERATIONS
                 )
-                found = _finite(found)
+                refitted = _finite(refitted)
             else:
-                found = own.fit
-            if found is None or found.total > _NO_GAIN * known.total:
+                refitted = own.fit
+            if refitted is None or refitted.total > _NO_GAIN * known.total:
                 added: Fit | None = known
                 for kind in self._study.chosen.problem.effects:
                     if kind.name in key - fewer and added is not None:
                         added = one_more(added, kind)
-                found = added or found
-            self._fits[key] = known if found is None or found.total > known.total else found
+                refitted = added or refitted
+            self._fits[key] = known if refitted is None or refitted.total > known.total else refitted
         return self._fits[key]
 
 

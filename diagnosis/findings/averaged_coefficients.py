@@ -235,31 +235,31 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, Quantity]:
     return estimates
 
 
-def correlation(answers: Answers, found: Mapping[str, Quantity]) -> tuple[tuple[float, ...], ...]:
+def correlation(answers: Answers, averaged: Mapping[str, Quantity]) -> tuple[tuple[float, ...], ...]:
     """The correlation of the coefficients by noise, small causes and rivals; see `Coefficients`.
 
     Args:
-        found: the coefficients averaged over the answers.
+        averaged: the coefficients averaged over the answers.
 
     Returns:
         In the order of the coefficients, shape (n, n).
     """
-    weights, means, noise = [], [], np.zeros((len(found), len(found)))
-    for one in answers.possible:
-        values, known = [_value(one.fit, name) for name in found], coefficients_of(one.fit)
-        if one.probability <= 0.0 or None in values:
+    weights, means, noise = [], [], np.zeros((len(averaged), len(averaged)))
+    for answer in answers.possible:
+        values, known = [_value(answer.fit, name) for name in averaged], coefficients_of(answer.fit)
+        if answer.probability <= 0.0 or None in values:
             continue
-        small, places = one.small or alone(one.fit), [known.index(name) for name in found]
-        gradients = coefficient_gradients(one.fit)[places]
-        noise += one.probability * gradients @ one.fit.stated_covariance @ gradients.T
-        weights.append(one.probability * small.weights)
+        small, places = answer.small or alone(answer.fit), [known.index(name) for name in averaged]
+        gradients = coefficient_gradients(answer.fit)[places]
+        noise += answer.probability * gradients @ answer.fit.stated_covariance @ gradients.T
+        weights.append(answer.probability * small.weights)
         means.append(np.array(values) + small.moves[:, places])
     if not means:
         return ()
     weight, mean = np.concatenate(weights), np.concatenate(means)
     away = mean - weight @ mean / weight.sum()
     shared = (noise + (away.T * weight) @ away) / weight.sum()
-    whole = np.maximum([(one.std or 0.0) ** 2 for one in found.values()], np.diag(shared))
+    whole = np.maximum([(quantity.std or 0.0) ** 2 for quantity in averaged.values()], np.diag(shared))
     scale = np.sqrt(np.maximum(whole, 1e-300))
     shared = shared / np.outer(scale, scale)
     np.fill_diagonal(shared, 1.0)
@@ -267,7 +267,7 @@ def correlation(answers: Answers, found: Mapping[str, Quantity]) -> tuple[tuple[
 
 
 def as_identified(
-    found: Mapping[str, Quantity], estimate: Estimate, campaign: Campaign, similarity: Similarity
+    averaged: Mapping[str, Quantity], estimate: Estimate, campaign: Campaign, similarity: Similarity
 ) -> dict[str, Quantity]:
     """The coefficients with the values and deviations of an estimate of the same runs, in the similar campaign.
 
@@ -275,8 +275,8 @@ def as_identified(
     coefficient that the estimate does not state is unchanged; ωn and ζ come from a campaign of one run.
     """
     runs = estimate.runs if len(estimate.runs) == 1 else ()
-    repeatability, same = estimate.repeatability, dict(found)
-    for name in found:
+    repeatability, same = estimate.repeatability, dict(averaged)
+    for name in averaged:
         given = next((one for of in (estimate, *runs) if (one := getattr(of, name, None)) is not None), None)
         if not isinstance(given, Quantity) or given.known_std <= 0.0:
             continue
@@ -376,7 +376,7 @@ def before_the_causes(nominal: Fit, after: Mapping[str, Quantity]) -> dict[str, 
     Args:
         after: the averages over the answers; the squared difference from them is added to the variance.
     """
-    found = {}
+    before = {}
     for place, name in enumerate(coefficients_of(nominal)):
         value, given = _value(nominal, name), after.get(name)
         if value is None or given is None:
@@ -386,8 +386,8 @@ def before_the_causes(nominal: Fit, after: Mapping[str, Quantity]) -> dict[str, 
             parts["noise"] = float(alone(nominal).noise[0, place])
         else:
             parts |= {source: share * given.std**2 for source, share in given.shares.items()}
-        found[name] = _estimate(nominal, name, value, math.sqrt(sum(parts.values())), parts)
-    return found
+        before[name] = _estimate(nominal, name, value, math.sqrt(sum(parts.values())), parts)
+    return before
 
 
 def _budget(parts: Mapping[str, float], variance: float) -> dict[str, float]:
@@ -428,15 +428,17 @@ def _of_answer(
         "freed form": 0.0 if unfreed is None else (form_std * (value - unfreed)) ** 2,
     }
     noise, forms = small.noise[:, place], small.forms[:, place]
-    found = NormalMixture(small.weights, value + small.moves[:, place], noise + forms + sum(common.values()))
+    mixture = NormalMixture(
+        small.weights, value + small.moves[:, place], noise + forms + sum(common.values())
+    )
     formal = float(small.weights @ noise)
     by_scatter = _by_scatter(fit, place) * formal
     within = {
         "noise": formal - by_scatter,
         "scatter": by_scatter,
-        "small causes": float(small.weights @ forms) + found.between,
+        "small causes": float(small.weights @ forms) + mixture.between,
     }
-    return answer.probability, found, within | common
+    return answer.probability, mixture, within | common
 
 
 def _by_scatter(fit: Fit, place: int) -> float:

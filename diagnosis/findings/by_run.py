@@ -89,24 +89,26 @@ class SizeByRun:
     @property
     def farthest(self) -> str:
         """The run with the size farthest from the common one, in standard deviations."""
-        away = {name: abs(one.value - self.common.value) / one.known_std for name, one in self.runs.items()}
+        away = {
+            name: abs(size.value - self.common.value) / size.known_std for name, size in self.runs.items()
+        }
         return max(away, key=away.__getitem__)
 
     @property
     def words(self) -> str:
         """Whether the runs agree on it, in sentences."""
         size, number = self.common, counted(len(self.runs), "run")
-        said = f"{sentence_case(plain(self.effect))}: {for_people(size.value, size.std, size.unit)} in all runs. "
+        text = f"{sentence_case(plain(self.effect))}: {for_people(size.value, size.std, size.unit)} in all runs. "
         if self.agrees:
-            said += f"The {number} that show it agree (p {p_text(self.p_value)})."
+            text += f"The {number} that show it agree (p {p_text(self.p_value)})."
         else:
-            said += (
+            text += (
                 f"The {number} that show it differ by {percent_of(self.spread)} beyond their errors "
                 f"(p {p_text(self.p_value)}), {self.farthest} the most: its law has another form, or a run is odd."
             )
         if self.silent:
-            said += f" {sentence_case(counted(len(self.silent), 'run'))} cannot show it."
-        return said
+            text += f" {sentence_case(counted(len(self.silent), 'run'))} cannot show it."
+        return text
 
 
 @dataclass(frozen=True)
@@ -131,32 +133,34 @@ class CausesByRun(Finding):
         units = _units(study.chosen)
         free = {name: Quantity(study.chosen.value(name), None, units[name]) for name in units}
 
-        def own(one: SizeByRun, given: Quantity) -> Quantity:
-            name = f"{one.effect}.{one.parameter}"  # the unit of the information depends on the exponents
+        def own(cause: SizeByRun, given: Quantity) -> Quantity:
+            name = f"{cause.effect}.{cause.parameter}"  # the unit of the information depends on the exponents
             return own_parameters({**free, name: given}, answered.campaign, study.similarity, study.model)[
                 name
             ]
 
-        found = tuple(
+        causes = tuple(
             replace(
-                one, common=own(one, one.common), runs={run: own(one, of) for run, of in one.runs.items()}
+                cause,
+                common=own(cause, cause.common),
+                runs={run: own(cause, of) for run, of in cause.runs.items()},
             )
-            for one in sizes(study.chosen, study.prepared.kinds)
+            for cause in sizes(study.chosen, study.prepared.kinds)
         )
-        return cls(found) if found else None
+        return cls(causes) if causes else None
 
     def section(self, judged: Judged) -> Section:
         """The causes on which the runs differ, the figure, and in detail the others with the table."""
-        heads = tuple(f"{plain(one.effect)} [{unit_mark(one.common.unit)}]" for one in self.causes)
-        ids = dict.fromkeys(name for one in self.causes for name in one.runs)
-        rows = tuple((name, *(_shown(one.runs.get(name)) for one in self.causes)) for name in ids)
+        heads = tuple(f"{plain(cause.effect)} [{unit_mark(cause.common.unit)}]" for cause in self.causes)
+        ids = dict.fromkeys(name for cause in self.causes for name in cause.runs)
+        rows = tuple((name, *(_shown(cause.runs.get(name)) for cause in self.causes)) for name in ids)
         table = TextTable("Size of each cause in every run, ± one standard deviation", ("run", *heads), rows,
                           right=heads)  # fmt: skip
         agree, differ = (
-            tuple(Paragraph(one.words, "Run by run") for one in self.causes if one.agrees is agrees)
+            tuple(Paragraph(cause.words, "Run by run") for cause in self.causes if cause.agrees is agrees)
             for agrees in (True, False)
         )
-        drawn = (one.block for one in self.pictures(judged))
+        drawn = (picture.block for picture in self.pictures(judged))
         detail = Detail((*agree, table, Paragraph(self._how, kind="small")))
         return Section("by-run", "Whether the runs agree", (*differ, *drawn, detail))
 
@@ -167,12 +171,12 @@ class CausesByRun(Finding):
             True: "fitted to each run with a stiffness and a damping of its own",
             False: "the size that suits one run, with every other number as in all runs",
         }
-        said = []
+        clauses = []
         for alone, way in ways.items():
-            names = [one.effect for one in self.causes if one.alone is alone]
+            names = [cause.effect for cause in self.causes if cause.alone is alone]
             if names:
-                said.append(f"{plain(*names)}: {way}")
-        return f"{sentence_case('; '.join(said))}."
+                clauses.append(f"{plain(*names)}: {way}")
+        return f"{sentence_case('; '.join(clauses))}."
 
     def pictures(self, judged: Judged) -> tuple[Picture, ...]:
         """The size of each cause by run, a panel each."""
@@ -279,24 +283,24 @@ def _in_runs(
 @styled
 def forest_figure(causes: Sequence[SizeByRun]) -> Figure:
     """The size of each cause in every run with its interval, and the common one as a band."""
-    tall = [0.8 + 0.2 * len(one.runs) for one in causes]
+    tall = [0.8 + 0.2 * len(cause.runs) for cause in causes]
     fig = figure(NARROW, sum(tall))
-    for axes, one in zip(
+    for axes, cause in zip(
         fig.subplots(len(causes), 1, squeeze=False, height_ratios=tall)[:, 0], causes, strict=True
     ):
-        low, high = one.common.ends
+        low, high = cause.common.ends
         axes.axvspan(low, high, color=NOISE, zorder=0)
-        axes.axvline(one.common.value, color=SOFT, lw=1.0)
-        rows = np.arange(len(one.runs))
-        values = [given.value for given in one.runs.values()]
-        reach = [INTERVAL * given.known_std for given in one.runs.values()]
+        axes.axvline(cause.common.value, color=SOFT, lw=1.0)
+        rows = np.arange(len(cause.runs))
+        values = [given.value for given in cause.runs.values()]
+        reach = [INTERVAL * given.known_std for given in cause.runs.values()]
         axes.errorbar(values, rows, xerr=reach, fmt="o", ms=4, color=AFTER, capsize=2)
-        axes.set_yticks(rows, list(one.runs))
+        axes.set_yticks(rows, list(cause.runs))
         axes.set(ylim=(len(rows) - 0.4, -0.6))
         symbol = next(
-            info.symbol for info in effect_class(one.effect).parameters() if info.name == one.parameter
+            info.symbol for info in effect_class(cause.effect).parameters() if info.name == cause.parameter
         )
-        axes.set_xlabel(f"{plain(one.effect)} {symbol} [{unit_mark(one.common.unit)}]")
+        axes.set_xlabel(f"{plain(cause.effect)} {symbol} [{unit_mark(cause.common.unit)}]")
         axes.locator_params(axis="x", nbins=5)
         grid(axes)
     return fig

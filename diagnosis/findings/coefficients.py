@@ -80,17 +80,17 @@ def coefficients_table(given: Coefficients, judged: Judged) -> TextTable:
     """
     before, after = given.before, given.after
     named, rows = judged.names_effects, []
-    skewed = any(one.interval for one in (after or before).values())
+    skewed = any(quantity.interval for quantity in (after or before).values())
     for label, nominal, with_causes in _rows(given):
         best = with_causes or nominal
-        cells = [_without_interval(one) for one in ([nominal, with_causes] if named else [best])]
+        cells = [_without_interval(quantity) for quantity in ([nominal, with_causes] if named else [best])]
         interval = _interval(best)
         if skewed and best is not None and best.std:
             cells[-1] += f"\n({interval})"
         change = "–"
-        both = [one for one in (nominal, with_causes) if one and one.determined]
+        both = [quantity for quantity in (nominal, with_causes) if quantity and quantity.determined]
         if len(both) == 2 and both[0].value:
-            change = size_change(*(one.value for one in both))
+            change = size_change(*(quantity.value for quantity in both))
         rows.append((label, *cells, *[interval] * (not skewed), *[change] * named))
     causes = "with the causes" if judged.decided else f"with the {judged.set_out}"
     detail = () if skewed else ("95 % interval",)
@@ -172,12 +172,12 @@ def coefficients_line(given: Coefficients) -> str:
 
     Empty if there is no such part.
     """
-    after = {name: one for name, one in given.after.items() if one.std}
+    after = {name: quantity for name, quantity in given.after.items() if quantity.std}
     if not after:
         return ""
     parts = []
     for source, words in SOURCES.items():
-        shares = {name: one.shares.get(source, 0.0) for name, one in after.items()}
+        shares = {name: quantity.shares.get(source, 0.0) for name, quantity in after.items()}
         if max(shares.values()) >= _COUNTS:
             mostly = listed(
                 [COEFFICIENTS.get(name, name) for name, share in shares.items() if share > _MOST] or [""]
@@ -185,7 +185,7 @@ def coefficients_line(given: Coefficients) -> str:
             parts.append(f"{words} (most of the variance of {mostly})" if mostly else words)
     if not parts:
         return ""
-    if all(one.shares.keys() <= {"noise", "scatter", "air density"} for one in after.values()):
+    if all(quantity.shares.keys() <= {"noise", "scatter", "air density"} for quantity in after.values()):
         return f"± is the ± of tunnel identify; it includes {listed(parts)}."
     return (
         f"± includes {listed(parts)}. The ± of tunnel identify includes the noise, the scatter between runs and "
@@ -229,21 +229,23 @@ def hidden_line(hidden: Sequence[Hidden], given: Coefficients) -> str:
     """
     after, general_form = given.after, Effect.undetected
     clauses: list[tuple[bool, str]] = []
-    for one in hidden:
+    for hidden_effect in hidden:
         moved = []
         for name, own in after.items():
-            move = one.moves.get(name)
+            move = hidden_effect.moves.get(name)
             if move is not None and own.std and move.value > own.std:
                 by = f"{significant(move.value, 2)} {'' if own.unit == '1' else unit_mark(own.unit)}"
                 moved.append((COEFFICIENTS.get(name, name), by.strip()))
-        form = next((kind.undetected for kind in known_effects() if kind.name == one.effect), general_form)
+        form = next(
+            (kind.undetected for kind in known_effects() if kind.name == hidden_effect.effect), general_form
+        )
         template = form if moved else ""
         general = template == general_form
-        if not moved or (general and any(said for said, _ in clauses)):
+        if not moved or (general and any(is_general for is_general, _ in clauses)):
             continue
-        size = _limit(one, abs(one.size.value))
+        size = _limit(hidden_effect, abs(hidden_effect.size.value))
         changes = " and ".join(f"{label} by {by}" for label, by in moved) if general else moved[-1][1]
-        words = {"effect": plain(one.effect), "size": size + explained({one.size.unit})}
+        words = {"effect": plain(hidden_effect.effect), "size": size + explained({hidden_effect.size.unit})}
         clause = template.format(changes=changes, **words)
         clauses.append((general, f"{clause[0].upper()}{clause[1:]}."))
     return f"Upper limits: {' '.join(clause for _, clause in clauses)}" if clauses else ""
@@ -258,20 +260,20 @@ def consequence(given: Coefficients, judged: Judged) -> str:
     if not judged.causes or judged.causes == UNKNOWN:
         return ""
     phase = given.in_phase
-    for name, one in given.before.items():
-        two = {**given.after, **phase}.get(name)
-        if two is None or not one.value or not (one.determined and two.determined):
+    for name, before in given.before.items():
+        after = {**given.after, **phase}.get(name)
+        if after is None or not before.value or not (before.determined and after.determined):
             continue
         label = COEFFICIENTS.get(name, name)
-        if two.std is not None and two.std > _OPEN * abs(two.value):
+        if after.std is not None and after.std > _OPEN * abs(after.value):
             clauses.append(
-                f"{label} remains uncertain ({for_people(two.value, two.std, unit_mark(two.unit))})"
+                f"{label} remains uncertain ({for_people(after.value, after.std, unit_mark(after.unit))})"
             )
             continue
-        label = f"the size of {label}" if one.value < 0.0 and two.value < 0.0 else label
-        share = 100.0 * relative_change(one.value, two.value)
-        values = _apart(one.value, two.value)
-        if one.value * two.value < 0.0:
+        label = f"the size of {label}" if before.value < 0.0 and after.value < 0.0 else label
+        share = 100.0 * relative_change(before.value, after.value)
+        values = _apart(before.value, after.value)
+        if before.value * after.value < 0.0:
             clauses.append(f"{COEFFICIENTS.get(name, name)} changes its sign ({values})")
         elif abs(share) < 0.5:
             clauses.append(f"{label} changes by less than 1 %")

@@ -68,7 +68,7 @@ class Hidden:
     significance: float = 0.0
 
 
-def hidden_effects(fit: Fit, starts: Starts, left: Sequence[Array] | None = None) -> tuple[Hidden, ...]:
+def hidden_effects(fit: Fit, starts: Starts, residuals: Sequence[Array] | None = None) -> tuple[Hidden, ...]:
     """Upper limits on effects beside the fitted ones, two standard deviations from the most likely size.
 
     The part of the change that the other parameters cannot absorb is a polynomial in the size: of second order
@@ -80,13 +80,13 @@ def hidden_effects(fit: Fit, starts: Starts, left: Sequence[Array] | None = None
     Args:
         fit: the fit of the answer, with or without effects.
         starts: the effects that may act beside the fitted ones.
-        left: scaled residuals for the dispersion, by run, where small causes beside the fit explain a part of
+        residuals: scaled residuals for the dispersion, by run, where small causes beside the fit explain a part of
             the fit's residuals; each of shape (n,).
 
     Returns:
         In the given order, without the effects that the runs cannot show.
     """
-    total = fit.total if left is None else sum(float(r @ r) for r in left)
+    total = fit.total if residuals is None else sum(float(r @ r) for r in residuals)
     beyond = max(total - fit.count - DISPERSION_STDS * np.sqrt(2.0 * fit.count), 0.0)
     reach = HIDDEN_STDS**2 * (1.0 + beyond / MISFIT_DEGREES)
     names, influence = coefficients_of(fit), influences(fit)
@@ -115,7 +115,7 @@ def hidden_effects(fit: Fit, starts: Starts, left: Sequence[Array] | None = None
     return tuple(hidden)
 
 
-def _confirmed(fit: Fit, start: StartingPoint, found: _Size, reach: float) -> _Size | None:
+def _confirmed(fit: Fit, start: StartingPoint, linear: _Size, reach: float) -> _Size | None:
     """The size at which a refit is ``reach`` above the least −2 ln L, with the changes of the coefficients.
 
     A refit confirms a size if its rise is within a tenth of ``reach``. A refit beyond that confirms it too if a
@@ -128,11 +128,11 @@ def _confirmed(fit: Fit, start: StartingPoint, found: _Size, reach: float) -> _S
     """
     assert start.scaled is not None
     if start.point.per_run.shape[1] > fit.point.per_run.shape[1]:
-        return found
-    limit = fit.unlikelihood - found.lowered
+        return linear
+    limit = fit.unlikelihood - linear.lowered
     least, greatest = sorted(one[start.scaled] for one in start.problem.bounds)
     size = float(
-        np.clip(found.size, least, greatest)
+        np.clip(linear.size, least, greatest)
     )  # a multiple of a trial may exceed its bound by rounding
     known: list[tuple[float, float]] = []
     along = np.zeros_like(fit.point.common)  # change of the other parameters per unit of the size
@@ -145,7 +145,7 @@ def _confirmed(fit: Fit, start: StartingPoint, found: _Size, reach: float) -> _S
         within = max((abs(one) for one, root in known if root < 1.0), default=0.0)
         if abs(rise - 1.0) <= _CONFIRMED or (rise > 1.0 and within < abs(size) < _CLOSE * within):
             return replace(
-                found,
+                linear,
                 size=size,
                 moves=_changes(fit, start, np.insert(again.point.common, start.scaled, size)),
             )
@@ -233,18 +233,18 @@ def _largest(fit: Fit, start: StartingPoint, influence: Sequence[Array], reach: 
     """
     if start.scaled is None:
         return None
-    found = None
+    limit = None
     for number in range(_ROUNDS if start.second_order else 1):
         size = float(start.point.common[start.scaled])
         # at a trial's size, a small share means that the runs cannot show the effect; at later sizes it may
         # be small
-        found = _within(fit, start, influence, reach, HIDDEN_ABSORBED if number == 0 else 0.0)
-        if found is None or found.size == 0.0 or 1.0 / _SETTLED < found.size / size < _SETTLED:
+        limit = _within(fit, start, influence, reach, HIDDEN_ABSORBED if number == 0 else 0.0)
+        if limit is None or limit.size == 0.0 or 1.0 / _SETTLED < limit.size / size < _SETTLED:
             break
         common = start.point.common.copy()
-        common[start.scaled] = found.size
+        common[start.scaled] = limit.size
         start = replace(start, point=replace(start.point, common=common))
-    return found
+    return limit
 
 
 def _within(

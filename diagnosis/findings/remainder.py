@@ -106,8 +106,10 @@ class Remainder:
         larger = excess > 1.0  # visible in the fit, whatever the move of the coefficients
         if larger:
             size = f"{size}, {significant(math.sqrt(excess), 2)} times the noise"
-        left = f"the residual ({size})" if named else "the gap"
-        subject = f"Part of the gap remains: {left}" if named and larger else left[0].upper() + left[1:]
+        remaining = f"the residual ({size})" if named else "the gap"
+        subject = remaining[0].upper() + remaining[1:]
+        if named and larger:
+            subject = f"Part of the gap remains: {remaining}"
         material = [name for name, move in moves.items() if move.material]
         known = [name for name, move in moves.items() if move.std is not None]
         if not causes:
@@ -116,7 +118,7 @@ class Remainder:
             words = "The residual is within the noise."
         elif material:
             moved = _each({name: change_up_to(moves[name].value, after[name]) for name in material})
-            start = f"Part of the gap remains: {left}" if named else subject
+            start = f"Part of the gap remains: {remaining}" if named else subject
             words = f"{start} could change {moved}. Do not trust the coefficients beyond the intervals given."
         elif not known:
             words = f"{subject} changes no coefficient that these runs determine."
@@ -186,41 +188,43 @@ def _each(sizes: dict[str, str]) -> str:
     return listed([f"{COEFFICIENTS.get(name, name)} by {size}" for name, size in sizes.items()])
 
 
-def closable_words(found: Closable | None, judged: Judged) -> str:
+def closable_words(closable: Closable | None, judged: Judged) -> str:
     """A few sentences on the explainable part of the remainder; empty where it is not known."""
-    if found is None:
+    if closable is None:
         return ""
     named = judged.causes != UNKNOWN and judged.decided
     beyond = " beyond the scatter between runs" if scattering(judged.causes) else ""
-    left = "the residual gap" if named else f"the gap{beyond}"
-    ceilings = found.ceilings
-    if found.kind == "noise":
-        most = max((one for one in ceilings if one.determined()), key=lambda one: one.closed)
+    gap_words = "the residual gap" if named else f"the gap{beyond}"
+    ceilings = closable.ceilings
+    if closable.kind == "noise":
+        most = max(
+            (ceiling for ceiling in ceilings if ceiling.determined()), key=lambda ceiling: ceiling.closed
+        )
         bound = percent(max(most.closed, 0.0) + NOISE_STDS * most.std)
         return (
-            f"No smooth moment or error of the reading could explain more than {bound} of {left}: the rest is "
+            f"No smooth moment or error of the reading could explain more than {bound} of {gap_words}: the rest is "
             "noise."
         )
-    of_others = _measured_otherwise(found.kind, ceilings)
-    return " ".join([*_largest(found, ceilings, left), *of_others, *_line(found.line)])
+    of_others = _measured_otherwise(closable.kind, ceilings)
+    return " ".join([*_largest(closable, ceilings, gap_words), *of_others, *_line(closable.line)])
 
 
-def _largest(found: Closable, ceilings: Sequence[Ceiling], left: str) -> list[str]:
+def _largest(closable: Closable, ceilings: Sequence[Ceiling], gap_words: str) -> list[str]:
     """The share that this kind explains beyond the other kinds, its place, and its formula."""
-    kind, where, law = found.kind, found.events, found.law
-    best = next(one for one in ceilings if one.kind == kind)
+    kind, where, law = closable.kind, closable.events, closable.law
+    best = next(ceiling for ceiling in ceilings if ceiling.kind == kind)
     sentences = [
-        f"{KINDS[kind].capitalize()} could explain {percent(best.closed, best.std)} of {left} (measured on "
+        f"{KINDS[kind].capitalize()} could explain {percent(best.closed, best.std)} of {gap_words} (measured on "
         f"held-out {best.held_out})."
     ]
-    if found.alike:
+    if closable.alike:
         sentences.append(
-            f"These runs cannot distinguish it from {' or '.join(KINDS[one] for one in found.alike)}."
+            f"These runs cannot distinguish it from {' or '.join(KINDS[other] for other in closable.alike)}."
         )
-    elif found.next_most is not None:
-        alike = all(one.held_out == best.held_out for one in ceilings)
+    elif closable.next_most is not None:
+        alike = all(ceiling.held_out == best.held_out for ceiling in ceilings)
         other = f"No other kind{'' if alike else f' measured on {best.held_out}'}"
-        sentences.append(f"{other} would explain more than {percent(max(found.next_most, 0.0))}.")
+        sentences.append(f"{other} would explain more than {percent(max(closable.next_most, 0.0))}.")
     if where and kind != "line":
         run = f"run {where[0]['run']} ({where[0]['from_s']:.2f} to {where[0]['to_s']:.2f} s)"
         largest = "" if len(where) == 1 else f"{len(where)} runs, the largest part in "
@@ -234,15 +238,17 @@ def _largest(found: Closable, ceilings: Sequence[Ceiling], left: str) -> list[st
 
 def _with_values(law: Law) -> str:
     """The numbers of a formula, as a clause; empty where it has none."""
-    stated, said, unknown = law.effect.get("parameters", {}), [], []
+    stated, determined, unknown = law.effect.get("parameters", {}), [], []
     for name, (value, std) in law.parameters.items():
         if not 0.0 < std < _UNKNOWN * abs(value):
             unknown.append(name)
             continue
         unit = stated.get(name, {}).get("unit", "1")
-        said.append(f"{name} = {with_std(value, std)}{unit_mark(beside(unit))}")
-    left = f"{listed(unknown)} not determined by these runs" if unknown else ""
-    return f", with {listed([*said, *filter(None, [left])])}" if said or left else ""
+        determined.append(f"{name} = {with_std(value, std)}{unit_mark(beside(unit))}")
+    undetermined = f"{listed(unknown)} not determined by these runs" if unknown else ""
+    return (
+        f", with {listed([*determined, *filter(None, [undetermined])])}" if determined or undetermined else ""
+    )
 
 
 _UNKNOWN = 10.0  # standard deviations over the value: neither sign nor order of magnitude is known
@@ -276,18 +282,18 @@ def _measured_otherwise(kind: str, ceilings: Sequence[Ceiling]) -> list[str]:
     ]
 
 
-def _line(found: Line | None) -> list[str]:
+def _line(line: Line | None) -> list[str]:
     """A steady line, in a sentence; none without one."""
-    if found is None:
+    if line is None:
         return []
-    frequency = with_std(found.frequency_hz, found.frequency_std_hz)
-    mark, factor = unit_shown(found.unit)
-    amplitude = with_std(factor * found.amplitude, factor * found.amplitude_std)
+    frequency = with_std(line.frequency_hz, line.frequency_std_hz)
+    mark, factor = unit_shown(line.unit)
+    amplitude = with_std(factor * line.amplitude, factor * line.amplitude_std)
     amplitude += joined_mark(mark)
     return [
         f"The line is at {frequency} Hz. Its amplitude is {amplitude} (root mean square over the runs). Chance "
         "alone shows a line in less than "
-        f"{100.0 * found.false_alarm_rate:.2g} % of campaigns."
+        f"{100.0 * line.false_alarm_rate:.2g} % of campaigns."
     ]
 
 
@@ -326,20 +332,20 @@ def closable_table(found: Closable | None) -> TextTable:
     return TextTable(title, ("kind of law", "share", "held out"), tuple(rows), ("share",))
 
 
-def law_pictures(found: Closable | None, reading: str) -> tuple[Picture, ...]:
+def law_pictures(closable: Closable | None, reading: str) -> tuple[Picture, ...]:
     """The figure of a law without a formula; none with a formula.
 
     Args:
         reading: unit of the readings.
     """
-    if found is None or found.curve is None:
+    if closable is None or closable.curve is None:
         return ()
     caption = (
         "The missing law, estimated without a formula, with its 95 % band. White cells of a map are within the "
         "band. The part that the coefficients and the zero of the model absorb is subtracted."
     )
     description = "The missing moment, or error of the reading, as a curve with its band or as a map."
-    return (Picture("law", caption, description, partial(law_figure, found.curve, reading)),)
+    return (Picture("law", caption, description, partial(law_figure, closable.curve, reading)),)
 
 
 @styled

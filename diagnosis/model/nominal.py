@@ -415,8 +415,8 @@ class NominalModel:
             )
         elif len(speeds) == _TOLD_BY:
             found.append(
-                "a wind-speed offset as opposed to a dependence of Cnβ on the speed, except by the damping: there are "
-                "only two wind speeds"
+                "a wind-speed offset as opposed to a dependence of Cnβ on the speed, except by the damping: there "
+                "are only two wind speeds"
             )
         if self.windy and not data.in_still_air:
             found.append("whether an effect is mechanical or aerodynamic: there is no run with the wind off")

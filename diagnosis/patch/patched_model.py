@@ -91,22 +91,24 @@ def native_closure(
         for number in range(FOLDS):
             out = [turn == number for turn in turns]
             try:
-                point, _ = fit_seen(chosen, [~left for left in out])
+                point, _ = fit_seen(chosen, [~held_out for held_out in out])
             except np.linalg.LinAlgError:
                 continue
-            for i, left in enumerate(out):
-                if left.any():
+            for i, held_out in enumerate(out):
+                if held_out.any():
                     start = point.per_run[i]
-                    seen = _restarted(chosen.problem, point.common, start, i, simulate, native, seen=~left)
-                    before.append(plain[runs[i].id][left])
-                    fitted.append(caused[runs[i].id][left])
-                    engine.append(seen.residual[left])
+                    restart = _restarted(
+                        chosen.problem, point.common, start, i, simulate, native, seen=~held_out
+                    )
+                    before.append(plain[runs[i].id][held_out])
+                    fitted.append(caused[runs[i].id][held_out])
+                    engine.append(restart.residual[held_out])
     if not engine:
         raise TunnelError("no run with the wind off could be held out", remedy="add runs with the wind off")
     nominal_power, fit_power, native_power = (
-        float(np.mean(np.concatenate(left) ** 2)) for left in (before, fitted, engine)
+        float(np.mean(np.concatenate(residuals) ** 2)) for residuals in (before, fitted, engine)
     )
-    count = sum(left.size for left in before)
+    count = sum(residuals.size for residuals in before)
     p_value = float(chdtrc(count, count * nominal_power))
     on = ON_RUNS if held else ON_STRETCHES
     return NativeClosure(nominal_power, fit_power, native_power, on, p_value), restarts
@@ -144,14 +146,16 @@ def _restarted(
     """
     seen = np.ones(problem.data.runs[index].reading.size, bool) if seen is None else seen
 
-    def left(per_run: Array) -> Array:
+    def residual_at(per_run: Array) -> Array:
         return engine_residual(problem, common, per_run, index, simulate, native)
 
-    best = left(own)
+    best = residual_at(own)
     # derivatives in the engine: its frequency may depend on the amplitude, unlike the fit's
     if slopes is None:
         steps = _SHIFT * max(abs(float(own[0])), 1e-3) * np.array([1.0, 10.0])
-        moved = [(best - left(own + step * np.eye(own.size)[k])) / step for k, step in enumerate(steps)]
+        moved = [
+            (best - residual_at(own + step * np.eye(own.size)[k])) / step for k, step in enumerate(steps)
+        ]
         slopes = np.array(moved).T
     columns = slopes[seen]
     for _ in range(_RELEASE_STEPS):  # the start changes too little to change the slopes
@@ -159,7 +163,7 @@ def _restarted(
         if np.sum((columns @ move) ** 2) <= _NO_DROP * np.sum(best[seen] ** 2):
             break
         trial = own + np.concatenate([move, np.zeros(own.size - 2)])
-        there = left(trial)
+        there = residual_at(trial)
         if not there[seen] @ there[seen] < best[seen] @ best[seen]:
             break
         own, best = trial, there
@@ -289,20 +293,20 @@ def _written_model(
     closure, restarts = native_closure(study.nominal, chosen, nominal_out, chosen_out, simulate, native)
     engine = compiled(chosen.point.common.tobytes())
     rest, slide = model.law.rest, model.law.slide
-    limits = (fact for one in identified.elements for fact in one.limits(engine, rest, slide=slide))
+    limits = (fact for per_run in identified.elements for fact in per_run.limits(engine, rest, slide=slide))
     differences = (*identified.differences, *limits)
     if given is not None and given.opt.integrator != int(mujoco.mjtIntegrator.mjINT_RK4):
         differences += (Fact("early steps", {"half_step_ms": 500.0 * given.opt.timestep}),)
     own = list(chosen.point.per_run)
     if given is not None:  # the engine's steps and its input do not begin as in the fit
         common = chosen.point.common
-        for i, one in enumerate(own):
+        for i, per_run in enumerate(own):
             held, slopes = restarts.get(i), None
             if held is not None:
-                one, slopes = np.concatenate([held.own[:2], one[2:]]), held.slopes
-            own[i] = _restarted(chosen.problem, common, one, i, simulate, native, slopes=slopes).own
+                per_run, slopes = np.concatenate([held.own[:2], per_run[2:]]), held.slopes
+            own[i] = _restarted(chosen.problem, common, per_run, i, simulate, native, slopes=slopes).own
     inputs = [run.moment(1.0) if run.id in runs else None for run in problem.data.runs]
-    starts = [replace(_start(problem, one, i), drive=inputs[i]) for i, one in enumerate(own)]
+    starts = [replace(_start(problem, per_run, i), drive=inputs[i]) for i, per_run in enumerate(own)]
     spec, written = patched(model, identified.elements, starts)
     zeros = [problem.zero(chosen.point.common, own) for own in chosen.point.per_run]
     zero = float(np.median(zeros)) + change.rest - model.law.rest

@@ -82,7 +82,7 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
     if kind is None:
         return None
     law, shape = None, None
-    found: Events = ()
+    largest: Events = ()
     if kind in common:
         shape = curve(unexplained, common[kind], similarity)
         law = _law(unexplained, kind, common[kind].drop, similarity)
@@ -92,11 +92,11 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
         other = {"angle": "r", "rate": "b"}.get(kind)
         kind = "state" if other and re.search(rf"\b{other}\b", formula) else kind
     elif line is not None and kind == "line":
-        found = line.events
+        largest = line.events
     elif kind in single:
-        found = events(unexplained, kind, single[kind].precision)
+        largest = events(unexplained, kind, single[kind].precision)
     where = tuple(
-        {**one, **{end: similarity.own(one[end], "s") for end in ("from_s", "to_s")}} for one in found
+        {**one, **{end: similarity.own(one[end], "s") for end in ("from_s", "to_s")}} for one in largest
     )
     ceilings = tuple(one.ceiling for one in (*common.values(), *single.values()))
     alike, next_most = _others(kind, ceilings)
@@ -148,18 +148,18 @@ def _others(kind: str, ceilings: tuple[Ceiling, ...]) -> tuple[tuple[str, ...], 
 
     A kind counts only if the chosen kind is not a special case of it, and if it is measured in the same way.
     """
-    best = next((one for one in ceilings if one.kind == kind), None)
+    best = next((ceiling for ceiling in ceilings if ceiling.kind == kind), None)
     if best is None:
         return (), None
     included = (kind, "state") if kind in ("angle", "rate") else (kind,)
     others = [
-        one
-        for one in ceilings
-        if one.determined() and one.held_out == best.held_out and one.kind not in included
+        ceiling
+        for ceiling in ceilings
+        if ceiling.determined() and ceiling.held_out == best.held_out and ceiling.kind not in included
     ]
     least = best.closed - max(NAMED_ALIKE, best.std)
-    alike = tuple(one.kind for one in others if one.closed >= least)
-    return alike, max((one.closed for one in others), default=None)
+    alike = tuple(ceiling.kind for ceiling in others if ceiling.closed >= least)
+    return alike, max((ceiling.closed for ceiling in others), default=None)
 
 
 def _own_line(line: SteadyLine, similarity: Similarity, chosen: RemainderSettings) -> Line:
@@ -302,10 +302,10 @@ def steady_line(unexplained: Unexplained) -> SteadyLine | None:
         return None
     runs = [path.run for path in unexplained.paths]
     width = 1.0 / max(run.duration for run in runs)
-    found = minimize_scalar(
+    minimum = minimize_scalar(
         lambda f: -_drops(unexplained, f).sum(), bounds=(start - width, start + width), method="bounded"
     )
-    frequency = float(found.x)
+    frequency = float(minimum.x)
     # Share of the line in one half of a run that the other half predicts: 1 at constant phase and amplitude.
     # Chance lowers the prediction by 2 in every half, and raises the fit.
     predicted, fitted = 0.0, 0.0
@@ -329,7 +329,7 @@ def steady_line(unexplained: Unexplained) -> SteadyLine | None:
     squares = 2.0 * np.maximum(drops - 2.0, 0.0) / sizes * noise**2  # chance adds two to the drop
     amplitude = float(np.sqrt(np.mean(squares)))
     # short gaps are predicted from the line around them, as for every kind that differs from run to run
-    closed, left = [], []
+    closed, excesses = [], []
     for path in unexplained.paths:
         waves, residual = _waves(path, frequency)
         turn, after = gaps(residual.size, path.group), 0.0
@@ -338,8 +338,8 @@ def steady_line(unexplained: Unexplained) -> SteadyLine | None:
             after += float(np.sum((residual[out] - waves[out] @ size) ** 2))
         power = float(residual @ residual)
         closed.append(power - after)
-        left.append(power - residual.size)
-    ceiling = Ceiling("line", *ratio(np.array(closed), np.array(left)), GAPS)
+        excesses.append(power - residual.size)
+    ceiling = Ceiling("line", *ratio(np.array(closed), np.array(excesses)), GAPS)
     times = [path.time + path.run.start for path in unexplained.paths]
     spans = [(float(time[0]), float(time[-1])) for time in times]
     return SteadyLine(

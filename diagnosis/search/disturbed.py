@@ -59,13 +59,13 @@ def prepared_undisturbed(
             measured = undisturbed(measured, disturbed)
             prepared, test = prepared_of(measured)
         except TunnelError:  # the other runs do not determine the model
-            disturbed = tuple(replace(one, kept_until_s=None, used=True) for one in disturbed)
-    if not (test.detected or prepared.cut) or any(one.used for one in disturbed):
+            disturbed = tuple(replace(disturbance, kept_until_s=None, used=True) for disturbance in disturbed)
+    if not (test.detected or prepared.cut) or any(disturbance.used for disturbance in disturbed):
         return prepared, test, disturbed
     with clock.step("where"):
         nominal = compressed(prepared.uncut) if prepared.uncut else prepared.in_wider_blocks().nominal
         odd = odd_alone(measured, nominal, kinds)
-    for some in dict.fromkeys([odd, tuple(replace(one, kept_from_s=None) for one in odd)]) if odd else ():
+    for some in dict.fromkeys([odd, tuple(replace(run, kept_from_s=None) for run in odd)]) if odd else ():
         with suppress(TunnelError):
             others, without = prepared_of(undisturbed(measured, some))
             if not others.cut and (not without.detected or differs(others.in_wider_blocks().nominal, kinds)):
@@ -95,7 +95,7 @@ def disturbances(measured: Campaign, nominal: Fit) -> tuple[Disturbance, ...]:
     similarity, chosen = nominal.problem.data.similarity, nominal.settings.selection
     data, clocks = nominal.problem.data, {run.id: run.record.time_s[0] + run.clock_s for run in measured.runs}
     index = {run.id: place for place, run in enumerate(data.runs)}
-    found: dict[str, Disturbance] = {}
+    disturbed: dict[str, Disturbance] = {}
 
     def clock(name: str, time: float) -> float:
         """A time since the start of a run's fitted part on the clock of its file, s."""
@@ -108,26 +108,26 @@ def disturbances(measured: Campaign, nominal: Fit) -> tuple[Disturbance, ...]:
         follows = (span - time) * frequency >= DISTURBED_KEPT and time < _EARLY * span
         return clock(name, time) if follows else None
 
-    first_cycles = {one.id: one for one in starts(nominal)}
+    first_cycles = {cycle.id: cycle for cycle in starts(nominal)}
     for name, p_value in beyond_the_others(list(first_cycles.values()), chosen):
         held = first_cycles[name]
         free = float(held.time[held.drop > 1.0][-1]) + 1.0 / resonance(nominal, index[name])
-        found[name] = Disturbance(name, None, None, p_value, kept_from_s=kept_from(name, free))
-    seen = {one.id: one for one in jumps(nominal)}
-    for name, p_value in beyond_the_others(list(seen.values()), chosen):
-        one = seen[name]
-        most = int(np.argmax(one.drop))
+        disturbed[name] = Disturbance(name, None, None, p_value, kept_from_s=kept_from(name, free))
+    by_run = {jump.id: jump for jump in jumps(nominal)}
+    for name, p_value in beyond_the_others(list(by_run.values()), chosen):
+        jump = by_run[name]
+        most = int(np.argmax(jump.drop))
         # fits that include a large jump show it early; it may begin a cycle before it appears
         first, frequency = most, resonance(nominal, index[name])
-        while first > 0 and _clear(float(one.chance[first - 1]), chosen):
+        while first > 0 and _clear(float(jump.chance[first - 1]), chosen):
             first -= 1
-        at = float(one.time[most])
-        last = min(float(one.time[first]), at - 1.0 / frequency)
-        kept = clock(name, last) if last * frequency >= DISTURBED_KEPT else None
+        at = float(jump.time[most])
+        last = min(float(jump.time[first]), at - 1.0 / frequency)
+        until = clock(name, last) if last * frequency >= DISTURBED_KEPT else None
         # a start that is not free, such as a hand that holds the body: the remaining part is used
-        begins = None if kept is not None else kept_from(name, at + 1.0 / frequency)
-        found[name] = Disturbance(name, clock(name, at), kept, p_value, kept_from_s=begins)
-    return tuple(sorted(found.values(), key=lambda one: one.run))
+        begins = None if until is not None else kept_from(name, at + 1.0 / frequency)
+        disturbed[name] = Disturbance(name, clock(name, at), until, p_value, kept_from_s=begins)
+    return tuple(sorted(disturbed.values(), key=lambda disturbance: disturbance.run))
 
 
 def beyond_the_others(runs: Sequence[Jumps], chosen: SelectionSettings) -> list[tuple[str, float]]:
@@ -142,20 +142,20 @@ def beyond_the_others(runs: Sequence[Jumps], chosen: SelectionSettings) -> list[
         return []
     from scipy.special import stdtr  # imported here because it is slow to load
 
-    instants = sum(one.drop.size for one in runs)
+    instants = sum(run.drop.size for run in runs)
     # a value below the maximum expected by chance of as many χ² is not a jump
-    sizes = np.log([max(float(one.drop.max()), 2.0 * np.log(one.drop.size), 1.0) for one in runs])
+    sizes = np.log([max(float(run.drop.max()), 2.0 * np.log(run.drop.size), 1.0) for run in runs])
     order = np.argsort(-sizes)
     most = min(max(1, int(DISTURBED_SHARE * len(runs))), len(runs) - 2)
     p_values = []
     for place in range(most):
-        one, others = order[place], sizes[order[place + 1 :]]
+        tested, others = order[place], sizes[order[place + 1 :]]
         prior, count = chosen.disturbed_prior, others.size
         freedom = prior + count - 1
         scatter = prior * chosen.disturbed_scatter**2 + (count - 1) * float(np.var(others, ddof=1))
         std = np.sqrt(scatter / freedom * (1.0 + 1.0 / count))
-        apart = (count + 1) * float(stdtr(freedom, -(sizes[one] - others.mean()) / std))
-        by_chance = instants * float(runs[one].chance.min())
+        apart = (count + 1) * float(stdtr(freedom, -(sizes[tested] - others.mean()) / std))
+        by_chance = instants * float(runs[tested].chance.min())
         p_values.append(min(1.0, max(apart, by_chance)))
     clear = [place for place, p in enumerate(p_values) if _clear(p, chosen)]
     return [(runs[order[place]].id, p_values[place]) for place in range(clear[-1] + 1 if clear else 0)]
@@ -171,15 +171,17 @@ def undisturbed(campaign: Campaign, disturbed: Sequence[Disturbance]) -> Campaig
     Raises:
         TunnelError: where no run would remain.
     """
-    found = {one.run: one for one in disturbed}
-    kept = campaign.without([name for name, one in found.items() if one.left_out])
+    by_run = {disturbance.run: disturbance for disturbance in disturbed}
+    remaining = campaign.without([name for name, disturbance in by_run.items() if disturbance.left_out])
     runs = []
-    for run in kept.runs:
-        one = found.get(run.id)
-        if one is not None and not one.used:
+    for run in remaining.runs:
+        disturbance = by_run.get(run.id)
+        if disturbance is not None and not disturbance.used:
             clock = run.record.time_s + run.clock_s
-            begin = -np.inf if one.kept_from_s is None else one.kept_from_s
-            inside = (clock >= begin) & (clock < (np.inf if one.kept_until_s is None else one.kept_until_s))
+            begin, end = disturbance.kept_from_s, disturbance.kept_until_s
+            inside = (clock >= (-np.inf if begin is None else begin)) & (
+                clock < (np.inf if end is None else end)
+            )
             run = replace(run, record=Record(run.record.time_s[inside], run.record.yaw_rad[inside]))
         runs.append(run)
-    return replace(kept, runs=tuple(runs))
+    return replace(remaining, runs=tuple(runs))

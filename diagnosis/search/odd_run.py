@@ -112,7 +112,7 @@ def odd_runs(measured: Campaign, study: Study) -> tuple[Disturbance, ...]:
 
 def _stated(odd: OddRuns | None, measured: Campaign, nominal: Fit) -> tuple[Disturbance, ...]:
     """Odd runs as facts, with the start of the part that moves like the other runs."""
-    found, data = list[Disturbance](), nominal.problem.data
+    disturbances, data = list[Disturbance](), nominal.problem.data
     if odd is None:
         return ()
     for name, p_value in odd.p_values.items():
@@ -122,8 +122,8 @@ def _stated(odd: OddRuns | None, measured: Campaign, nominal: Fit) -> tuple[Dist
             run = next(one for one in measured.runs if one.id == name)
             begun = float(run.record.time_s[0]) + run.clock_s
             start = begun + data.similarity.own(data.runs[index].start + start, "s")
-        found.append(Disturbance(name, None, None, p_value, kept_from_s=start))
-    return tuple(found)
+        disturbances.append(Disturbance(name, None, None, p_value, kept_from_s=start))
+    return tuple(disturbances)
 
 
 def _free_from(others: Fit, nominal: Fit, index: int) -> float | None:
@@ -142,10 +142,10 @@ def _free_from(others: Fit, nominal: Fit, index: int) -> float | None:
         start.per_run[0, 0] = data.runs[0].reading[0]
         problem = replace(others.problem, data=data)
         slopes = [slope for _, slope in sensitivities(problem, start)]
-        _, (left,) = refit_releases(problem, start, slopes)
+        _, (residual,) = refit_releases(problem, start, slopes)
         level = max(others.total / others.count, 1.0)
         if (
-            float(fdtrc(left.size, others.count, float(left @ left) / left.size / level))
+            float(fdtrc(residual.size, others.count, float(residual @ residual) / residual.size / level))
             > chosen.disturbed_rate
         ):
             return first * run.interval
@@ -154,13 +154,13 @@ def _free_from(others: Fit, nominal: Fit, index: int) -> float | None:
 
 def _sets(study: Study) -> list[Hypothesis]:
     """The weighed sets of effects, for runs that repeat: an odd run would otherwise look like scatter."""
-    found = []
+    hypotheses = []
     for answer in study.answers:
-        one = answer.hypothesis
-        fit = None if one is None else one.repeating if one.fit.problem.scatter else one.fit
-        if one is not None and fit is not None and one.effects:
-            found.append(Hypothesis(one.effects, fit))
-    return found
+        whole = answer.hypothesis
+        fit = None if whole is None else whole.repeating if whole.fit.problem.scatter else whole.fit
+        if whole is not None and fit is not None and whole.effects:
+            hypotheses.append(Hypothesis(whole.effects, fit))
+    return hypotheses
 
 
 def _explaining(sets: Sequence[Hypothesis], nominal: Fit, kinds: Sequence[type[Effect]]) -> list[OddRuns]:
@@ -174,22 +174,22 @@ def _explaining(sets: Sequence[Hypothesis], nominal: Fit, kinds: Sequence[type[E
     if data.driven or len(data.runs) < DISTURBED_FEWEST:
         return []
     refitted = list(_without_a_run(sets))
-    gaps = {tuple(one.p_values): gap_left(one.beside.fit) for one in refitted if not one.beside.effects}
-    tried = [one for one in refitted if max(one.p_values.values()) < chosen.disturbed_rate]
-    found = [
-        one
-        for one in tried
-        if (gap := gaps.get(tuple(one.p_values))) is not None
-        and one.beside.leaves_within(error_of_form(gap, weighing) * bool(one.beside.effects))
+    gaps = {tuple(odd.p_values): gap_left(odd.beside.fit) for odd in refitted if not odd.beside.effects}
+    tried = [odd for odd in refitted if max(odd.p_values.values()) < chosen.disturbed_rate]
+    explaining = [
+        odd
+        for odd in tried
+        if (gap := gaps.get(tuple(odd.p_values))) is not None
+        and odd.beside.leaves_within(error_of_form(gap, weighing) * bool(odd.beside.effects))
     ]
-    if found or nominal.problem.scatter:
-        return found
-    for one in _without_several([one for one in tried if not one.beside.effects], nominal, kinds):
-        if one.beside.explains_runs or one.beside.leaves_within(np.zeros(len(CHANNELS))):
-            if not one.beside.fit.problem.scatter:
-                return [one]
+    if explaining or nominal.problem.scatter:
+        return explaining
+    for odd in _without_several([odd for odd in tried if not odd.beside.effects], nominal, kinds):
+        if odd.beside.explains_runs or odd.beside.leaves_within(np.zeros(len(CHANNELS))):
+            if not odd.beside.fit.problem.scatter:
+                return [odd]
             differing = scattered(nominal, kinds)
-            return [one] if differing is not None and not _are_explained(differing, one) else []
+            return [odd] if differing is not None and not _are_explained(differing, odd) else []
     return []
 
 
@@ -255,43 +255,47 @@ def _are_explained(fitted: Fit, odd: OddRuns) -> bool:
 
 
 def _simplest(
-    found: Sequence[OddRuns], rivals: Sequence[Hypothesis], nominal: Fit, at_random: FittedSet | None = None
+    candidates: Sequence[OddRuns],
+    rivals: Sequence[Hypothesis],
+    nominal: Fit,
+    at_random: FittedSet | None = None,
 ) -> OddRuns | None:
     """The most likely odd runs; None if there are none, or a rival set of causes in all runs weighs as much.
 
     Args:
         at_random: a rival set with a random moment.
     """
-    if not found:
+    if not candidates:
         return None
     share, count = nominal.settings.selection.odd_share, len(nominal.problem.data.runs)
     if any(
-        one.beside.fit.problem.scatter for one in found
+        odd.beside.fit.problem.scatter for odd in candidates
     ):  # a set that leaves a gap cannot be compared by its evidence
-        rivals = [one for one in rivals if one.leaves_within(np.zeros(len(CHANNELS)))]
+        rivals = [rival for rival in rivals if rival.leaves_within(np.zeros(len(CHANNELS)))]
         at_random = None
-    sets = [*rivals, *(one.beside for one in found)]
+    sets = [*rivals, *(odd.beside for odd in candidates)]
     scale = Scale.of(sets, gap_left(nominal), nominal.settings.weighing)
-    best = max(found, key=lambda one: _weight(one.beside, scale))
+    best = max(candidates, key=lambda odd: _weight(odd.beside, scale))
     # the odds of an odd run: the share of campaigns that have one
     weight = _weight(best.beside, scale) - len(best.p_values) * np.log(count * (1.0 - share) / share)
     # the price of a rival's free forms does not count in favour of an odd run
-    weights = [_weight(one, scale) + scale.chosen.form_price * one.further_numbers for one in rivals]
+    weights = [_weight(rival, scale) + scale.chosen.form_price * rival.further_numbers for rival in rivals]
     weights += [] if at_random is None else [scale.weight_of(at_random)]
     if weight <= max(weights, default=-np.inf):
         return None
     # chance may explain a deviation in stiffness, damping or wind speed
-    by_chance = any(one.fit.problem.scatter and _are_explained(one.fit, best) for one in rivals)
+    by_chance = any(rival.fit.problem.scatter and _are_explained(rival.fit, best) for rival in rivals)
     return None if by_chance else best
 
 
-def _weight(one: Hypothesis, scale: Scale) -> float:
+def _weight(hypothesis: Hypothesis, scale: Scale) -> float:
     """Logarithm of the weight of a set; chance differences between the runs count by their evidence."""
-    if not one.fit.problem.scatter:
-        return scale.weight(one)
-    cost = gap_left(one.fit).scatter_cost
-    excess = one.excess - scale.least
-    return log_weight(excess, scale.misfit, len(one.effects), one.further_numbers, scale.chosen, (cost, cost))
+    if not hypothesis.fit.problem.scatter:
+        return scale.weight(hypothesis)
+    cost = gap_left(hypothesis.fit).scatter_cost
+    excess = hypothesis.excess - scale.least
+    count, further = len(hypothesis.effects), hypothesis.further_numbers
+    return log_weight(excess, scale.misfit, count, further, scale.chosen, (cost, cost))
 
 
 def replaceable(data: Data) -> list[int]:
@@ -345,23 +349,23 @@ def _without_a_run(sets: Sequence[Hypothesis]) -> Iterator[OddRuns]:
     if not runs:
         return
     tried = []
-    for one in sets:
-        without = WithoutRuns.of(one.fit)
-        left = (without.total - without.count)[runs]
-        most = (1.0 - ODD_HOLDS) * (one.fit.total - one.fit.count)
-        order = [runs[place] for place in np.argsort(left) if left[place] < most]
-        tried.append((float(left.min()), one, order))
+    for hypothesis in sets:
+        without = WithoutRuns.of(hypothesis.fit)
+        excesses = (without.total - without.count)[runs]
+        most = (1.0 - ODD_HOLDS) * (hypothesis.fit.total - hypothesis.fit.count)
+        order = [runs[place] for place in np.argsort(excesses) if excesses[place] < most]
+        tried.append((float(excesses.min()), hypothesis, order))
     (_, nominal, of_nominal), *others = tried
     by_chance = nominal.fit.settings.weighing.chance_stds * np.sqrt(2.0 * nominal.fit.count)
     others.sort(key=lambda given: (max(given[0], by_chance), len(given[1].effects)))
-    likely = [(one, order[:_RUNS]) for _, one, order in others[:_SETS]]
+    likely = [(hypothesis, order[:_RUNS]) for _, hypothesis, order in others[:_SETS]]
     asked = [index for index in runs if index in of_nominal or any(index in order for _, order in likely)]
-    for one, order in [(nominal, asked), *likely]:
+    for hypothesis, order in [(nominal, asked), *likely]:
         for index in order:
-            fitted = refitted_without(one.fit, index)
+            fitted = refitted_without(hypothesis.fit, index)
             if fitted is not None:
-                p_value = _p_value(one.fit, fitted, index)
-                yield OddRuns({data.runs[index].id: p_value}, Hypothesis(one.effects, fitted))
+                p_value = _p_value(hypothesis.fit, fitted, index)
+                yield OddRuns({data.runs[index].id: p_value}, Hypothesis(hypothesis.effects, fitted))
 
 
 def _p_value(whole: Fit, others: Fit, index: int) -> float:

@@ -64,54 +64,54 @@ def without_deviations(fitted: Fit) -> tuple[Problem, Point]:
     return replace(fitted.problem, scatter=()), Point(fitted.point.common, fitted.point.per_run[:, kept])
 
 
-def chance(found: Fit, kind: type[BetweenRuns], width: float) -> Chance:
+def chance(fitted: Fit, kind: type[BetweenRuns], width: float) -> Chance:
     """A chance difference beside the nominal model as fitted.
 
     Args:
         width: relative width of the runs' deviations, dimensionless.
     """
-    run = found.problem.stated(found.point.common, found.point.per_run[0], found.problem.data.runs[0])
+    run = fitted.problem.stated(fitted.point.common, fitted.point.per_run[0], fitted.problem.data.runs[0])
     return Chance(kind, width, run.derivatives, run.mechanical_damping)
 
 
-def usual(found: Fit, kind: type[BetweenRuns]) -> Chance:
+def usual(fitted: Fit, kind: type[BetweenRuns]) -> Chance:
     """A chance difference of usual width."""
-    return chance(found, kind, kind.parameters()[0].scale)
+    return chance(fitted, kind, kind.parameters()[0].scale)
 
 
-def as_stated(found: Fit, kinds: Sequence[type[Effect]]) -> Fit:
+def as_stated(fitted: Fit, kinds: Sequence[type[Effect]]) -> Fit:
     """A fit with the scatter that the campaign states; unchanged if it states none.
 
     Args:
-        found: a fit to runs that repeat exactly.
+        fitted: a fit to runs that repeat exactly.
         kinds: the effects that may be named.
     """
-    known = found.problem.data.repeatability
-    stated = [kind for kind in may_scatter(kinds, found.problem.data) if known.get(kind.scatters, 0.0) > 0.0]
+    known = fitted.problem.data.repeatability
+    stated = [kind for kind in may_scatter(kinds, fitted.problem.data) if known.get(kind.scatters, 0.0) > 0.0]
     if not stated:
-        return found
-    scatter = tuple(chance(found, kind, known[kind.scatters]) for kind in stated)
-    return try_fit(*with_deviations(found.problem, found.point, scatter)) or found
+        return fitted
+    scatter = tuple(chance(fitted, kind, known[kind.scatters]) for kind in stated)
+    return try_fit(*with_deviations(fitted.problem, fitted.point, scatter)) or fitted
 
 
-def scattered(found: Fit, kinds: Sequence[type[Effect]]) -> Fit | None:
+def scattered(fitted: Fit, kinds: Sequence[type[Effect]]) -> Fit | None:
     """A fit with more scatter than stated; None where the runs do not show it, or the fit fails.
 
     Args:
-        found: a fit with the stated scatter.
+        fitted: a fit with the stated scatter.
         kinds: the effects that may be named.
     """
-    able = may_scatter(kinds, found.problem.data)
+    able = may_scatter(kinds, fitted.problem.data)
     if not able:
         return None
-    scatter = tuple(usual(found, kind) for kind in able)
-    problem, point = with_deviations(*without_deviations(found), scatter)
+    scatter = tuple(usual(fitted, kind) for kind in able)
+    problem, point = with_deviations(*without_deviations(fitted), scatter)
     jacobian = sensitivities(problem, point)
     if not all(np.all(np.isfinite(c)) and np.all(np.isfinite(r)) for c, r in jacobian):
         return None
-    residuals = found.residuals if not found.problem.scatter else scaled_residuals(problem, point)
+    residuals = fitted.residuals if not fitted.problem.scatter else scaled_residuals(problem, point)
     columns, prior = ScatterColumns.of(problem, point, residuals, jacobian), width_prior(problem)
-    if not _evident(columns, prior, np.ones(len(able), bool), found.settings.scatter):
+    if not _evident(columns, prior, np.ones(len(able), bool), fitted.settings.scatter):
         return None
     layered = try_fit(with_widths(problem, columns.likeliest(prior)), point)
     return None if layered is None else with_likeliest_widths(layered)
@@ -171,14 +171,14 @@ def evident(fitted: Fit) -> Fit:
     scatter, known = fitted.problem.scatter, fitted.problem.data.repeatability
     if shown := shown_by(fitted):
         widths = fitted.columns.likeliest(width_prior(fitted.problem)).widths
-        found = [
+        widened = [
             replace(one, width=float(width), shown=one.name in shown)
             for one, width in zip(scatter, widths, strict=True)
         ]
     else:
         stated = [(one, known.get(one.kind.scatters, 0.0)) for one in scatter]
-        found = [replace(one, width=width, shown=False) for one, width in stated if width > 0.0]
-    return with_scatter(fitted, tuple(found))
+        widened = [replace(one, width=width, shown=False) for one, width in stated if width > 0.0]
+    return with_scatter(fitted, tuple(widened))
 
 
 def shown_by(fitted: Fit) -> tuple[str, ...]:
@@ -195,15 +195,15 @@ def shown_by(fitted: Fit) -> tuple[str, ...]:
 
 def _shown(columns: ScatterColumns, prior: WidthPrior, chosen: ScatterSettings) -> Kept:
     """The quantities that differ between the runs; the least needed one is removed repeatedly."""
-    kept = np.ones(prior.usual.size, bool)
-    while kept.sum() > 1:
-        places = np.flatnonzero(kept)
-        gains = [_gain(columns, prior, kept, np.arange(kept.size) == place) for place in places]
+    varying = np.ones(prior.usual.size, bool)
+    while varying.sum() > 1:
+        places = np.flatnonzero(varying)
+        gains = [_gain(columns, prior, varying, np.arange(varying.size) == place) for place in places]
         least = int(np.argmin(gains))
         if gains[least] >= chdtri(1.0, chosen.which_scatters_rate):
             break
-        kept[places[least]] = False
-    return kept
+        varying[places[least]] = False
+    return varying
 
 
 def drifting(fitted: Fit) -> Between | None:

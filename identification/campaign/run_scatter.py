@@ -250,30 +250,32 @@ def scatter_between(
     names = [SCATTERED[place] for place in shown]
     prior = usual.prior(names, stated)
     runs = measured.about(start, np.array(shown))
-    kept = np.arange(len(names))
+    scattering = np.arange(len(names))
     widths = prior.usual
     if prior.free.any():
         widths = likeliest_widths(runs, prior)
         none = np.where(prior.free, _ZERO * prior.usual, prior.usual)
         gained = marginal(runs, none).restricted - marginal(runs, widths).restricted
         if gained < ratio_limit(int(prior.free.sum())):
-            kept = np.flatnonzero(~prior.free)
-    if not kept.size:
+            scattering = np.flatnonzero(~prior.free)
+    if not scattering.size:
         return None
-    used = np.array(shown)[kept]
-    runs, widths = measured.about(start, used), widths[kept]
-    prior = WidthPrior(prior.usual[kept], prior.decades[kept], prior.least[kept], prior.most[kept])
-    found = marginal(runs, widths)
+    used = np.array(shown)[scattering]
+    runs, widths = measured.about(start, used), widths[scattering]
+    prior = WidthPrior(
+        prior.usual[scattering], prior.decades[scattering], prior.least[scattering], prior.most[scattering]
+    )
+    fitted = marginal(runs, widths)
     moves = [move[:, used] * widths for move in measured.moves]
-    gains, noise = _gains(measured, moves, found)
+    gains, noise = _gains(measured, moves, fitted)
     return ScatterFit(
-        tuple(names[place] for place in kept),
+        tuple(names[place] for place in scattering),
         widths,
         _uncertainty(runs, widths, prior),
-        tuple(names[place] for place in kept if names[place] in stated),
-        start + found.common,
+        tuple(names[place] for place in scattering if names[place] in stated),
+        start + fitted.common,
         noise,
-        found.quadratic,
+        fitted.quadratic,
         gains,
         moves,
         measured.values,

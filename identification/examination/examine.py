@@ -147,28 +147,28 @@ def measured(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...], SlipEvid
     """
     for run in campaign.runs:
         loads(run, campaign.rig)
-    kept, faults = mended(campaign)
+    usable, faults = mended(campaign)
     refused = tuple(remark for remark in faults if remark.outcome is Outcome.REFUSED)
     if refused:
         return campaign, refused, None
-    noted = noted_readings(kept)
-    kept, clocks = with_clocks(kept)
+    noted = noted_readings(usable)
+    usable, clocks = with_clocks(usable)
     # Driven runs neither begin with a release nor end at rest, and their input is known.
-    driven, order = kept.driven_runs, [run.id for run in kept.runs]
-    if driven and not kept.decays:
-        return kept, (*faults, *noted, *clocks), None
+    driven, order = usable.driven_runs, [run.id for run in usable.runs]
+    if driven and not usable.decays:
+        return usable, (*faults, *noted, *clocks), None
     if driven:
-        kept = replace(kept, runs=kept.decays)
-    kept, releases = from_releases(kept)
-    kept, rests = without_rest(kept)
-    kept, excited = self_excited_runs(kept)
-    kept, zeros = with_zeros(kept)
-    swings = tuple(swing for run in kept.runs if (swing := swing_of(run)) is not None)
-    evidence = SlipEvidence(kept, campaign, swings)
+        usable = replace(usable, runs=usable.decays)
+    usable, releases = from_releases(usable)
+    usable, rests = without_rest(usable)
+    usable, excited = self_excited_runs(usable)
+    usable, zeros = with_zeros(usable)
+    swings = tuple(swing for run in usable.runs if (swing := swing_of(run)) is not None)
+    evidence = SlipEvidence(usable, campaign, swings)
     if driven:
-        found = {run.id: run for run in (*kept.runs, *driven)}
-        kept = replace(kept, runs=tuple(found[name] for name in order if name in found))
-    return kept, (*faults, *noted, *clocks, *releases, *rests, *excited, *zeros), evidence
+        by_id = {run.id: run for run in (*usable.runs, *driven)}
+        usable = replace(usable, runs=tuple(by_id[name] for name in order if name in by_id))
+    return usable, (*faults, *noted, *clocks, *releases, *rests, *excited, *zeros), evidence
 
 
 def from_releases(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:

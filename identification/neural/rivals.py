@@ -81,7 +81,7 @@ def _drifts_and_steps(w: RivalWindows, stiffness: Array | float) -> list[Column]
 
 def campaign_columns(w: RivalWindows, c: RivalConditions) -> Array:
     """The columns of the rivals of a campaign, shape (2 w, 51)."""
-    one, ones = np.ones_like(c.stiffness), np.ones(w.time.size)
+    constant, ones = np.ones_like(c.stiffness), np.ones(w.time.size)
     on = c.speed > 0.0
     damped = [
         *((power, w.omega**power) for power in (-1.0, -0.5, 0.5, 1.0, 2.0)),
@@ -92,7 +92,7 @@ def campaign_columns(w: RivalWindows, c: RivalConditions) -> Array:
     ]
     stiff = [
         *((power, c.stiffness) for power in _ANY),
-        *((power, one) for power in (-1.0, 0.0, 2.0)),
+        *((power, constant) for power in (-1.0, 0.0, 2.0)),
         *((power, c.stiffness_load) for power in (-1.0, 1.0, 2.0, 4.0)),
         (0.0, c.stiffness**2),
         (0.0, c.stiffness * c.stiffness_load),
@@ -186,18 +186,18 @@ def fit_rivals(values: Array, design: Array, columns: Array, weights: Array, tak
         taken: number of unknowns eliminated beforehand.
     """
     root = np.sqrt(weights)
-    nominal, seen = design * root[:, None], columns * root[:, None]
+    nominal, scaled = design * root[:, None], columns * root[:, None]
     normal = nominal.T @ nominal
     if not determined(normal):
         return None
     covariance = inverse(normal)
     parameters = scaled_solve(normal, nominal.T @ (root * values))
     rest = root * values - nominal @ parameters
-    full = np.einsum("nc,nc->c", seen, seen)
+    full = np.einsum("nc,nc->c", scaled, scaled)
     valid = full > 0.0
-    seen = seen / np.sqrt(np.where(valid, full, 1.0))
-    moves = covariance @ (nominal.T @ seen)  # (p, c): shift of the parameters by each column
-    own = seen - nominal @ moves
+    scaled = scaled / np.sqrt(np.where(valid, full, 1.0))
+    moves = covariance @ (nominal.T @ scaled)  # (p, c): shift of the parameters by each column
+    own = scaled - nominal @ moves
     gram, aim = own.T @ own, own.T @ rest
     alone = np.diag(gram).copy()
     sizes = aim / (alone + _PRIOR)
@@ -237,16 +237,16 @@ def forward_selection(gram: Array, aim: Array, number: int) -> list[int]:
         gram: products of the columns, shape (c, c).
         aim: products of the columns with the data, shape (c,).
     """
-    left, own = aim.copy(), np.diag(gram).copy()
+    rest, own = aim.copy(), np.diag(gram).copy()
     gram = gram.copy()
     chosen: list[int] = []
     for _ in range(min(number, aim.size)):
-        gain = left**2 / (own + _PRIOR)
+        gain = rest**2 / (own + _PRIOR)
         gain[chosen] = -1.0
         best = int(np.argmax(gain))
         chosen.append(best)
         share = gram[:, best] / (own[best] + _PRIOR)
-        left = left - share * left[best]
+        rest = rest - share * rest[best]
         gram = gram - np.outer(share, gram[best])
         own = np.maximum(np.diag(gram), 0.0)
     return chosen
@@ -302,28 +302,28 @@ def record_features(runs: Sequence[Demodulated]) -> list[tuple[Features, Rivals]
     ends = 2 * np.cumsum(windows.sizes)
     pairs: list[tuple[Features, Rivals] | None] = []
     for run, a, b in zip(runs, ends - 2 * windows.sizes, ends, strict=True):
-        found = _fit([run], np.concatenate((run.logarithm, run.phase)), nominal[a:b], columns[a:b])
-        if found is None:
+        fitted = _fit([run], np.concatenate((run.logarithm, run.phase)), nominal[a:b], columns[a:b])
+        if fitted is None:
             pairs.append(None)
             continue
-        rate, omega = run.rate + found.parameters[0], run.omega + found.parameters[1]
+        rate, omega = run.rate + fitted.parameters[0], run.omega + fitted.parameters[1]
         natural = float(np.hypot(rate, omega))
         jacobian = np.array([[omega**2, -rate * omega], [rate * natural**2, omega * natural**2]]) / natural**3
-        moved = np.array([[rate, omega]]) + found.shifts
+        moved = np.array([[rate, omega]]) + fitted.shifts
         sizes = np.hypot(moved[:, 0], moved[:, 1])
         moved = np.column_stack((moved[:, 0] / sizes, sizes))
-        own = _run_features(run, found, 0.0, np.zeros(2), 0.0)
-        pairs.append((_features(found, moved, jacobian, np.ones(2, dtype=bool), own[None]), found))
+        own = _run_features(run, fitted, 0.0, np.zeros(2), 0.0)
+        pairs.append((_features(fitted, moved, jacobian, np.ones(2, dtype=bool), own[None]), fitted))
     return pairs
 
 
 def campaign_features(
-    runs: Sequence[Run], seen: Sequence[Demodulated], design: Design, alone: Sequence[Rivals]
+    runs: Sequence[Run], decays: Sequence[Demodulated], design: Design, alone: Sequence[Rivals]
 ) -> Features | None:
     """Features of a campaign, for Cnβ, Cnr, Izz and Cr; None if the runs do not determine any coefficient."""
     # The windows' own decays are added to their deviations.
     parts, blocks = [], []
-    for decay, link in zip(seen, design.links, strict=True):
+    for decay, link in zip(decays, design.links, strict=True):
         half = decay.time / (2.0 * decay.omega)
         stiffness = decay.omega**2 + decay.rate**2
         parts += [
@@ -332,35 +332,35 @@ def campaign_features(
         ]
         blocks += [np.outer(-decay.time, link[0]), np.outer(half, link[1] - 2.0 * decay.rate * link[0])]
     values, shared = np.concatenate(parts), np.concatenate(blocks)
-    first = _fit(seen, values, shared, np.zeros((values.size, 0)))
+    first = _fit(decays, values, shared, np.zeros((values.size, 0)))
     if first is None:
         return None
     start = derivatives(design, first.parameters)
     air = (start.get("cn_beta") or 0.0, start.get("cn_r") or 0.0)
-    columns = campaign_columns(RivalWindows.of(seen), RivalConditions.of(runs, design, air))
-    found = _fit(seen, values, shared, columns)
-    if found is None or not start.names:
+    columns = campaign_columns(RivalWindows.of(decays), RivalConditions.of(runs, design, air))
+    fitted = _fit(decays, values, shared, columns)
+    if fitted is None or not start.names:
         return None
     known = np.array([name in start.names for name in CAMPAIGN_NAMES])
-    moved = np.zeros((len(found.shifts), len(CAMPAIGN_NAMES)))
-    for place, shift in enumerate(found.shifts):
-        under = derivatives(design, found.parameters + shift)
+    moved = np.zeros((len(fitted.shifts), len(CAMPAIGN_NAMES)))
+    for place, shift in enumerate(fitted.shifts):
+        under = derivatives(design, fitted.parameters + shift)
         if under.names:
             moved[place, known] = under.values
         else:
             moved[place, known] = start.values + start.jacobian @ shift
-            found.valid[place] = False
+            fitted.valid[place] = False
     jacobian = np.zeros((len(CAMPAIGN_NAMES), design.size))
     jacobian[known] = start.jacobian
     fastest = max(run.wind_speed for run in runs)
     rows = []
-    for run, decay, rivals, link in zip(runs, seen, alone, design.links, strict=True):
+    for run, decay, rivals, link in zip(runs, decays, alone, design.links, strict=True):
         own = np.array([decay.rate, decay.omega]) + rivals.parameters
-        rate, stiffness = link @ found.parameters
+        rate, stiffness = link @ fitted.parameters
         gap = own - np.array([rate, np.sqrt(max(stiffness - rate**2, 0.0))])
         away = gap / np.sqrt(np.diag(rivals.covariances[0]))
         rows.append(_run_features(decay, rivals, run.wind_speed / max(fastest, 1e-300), away, 1.0))
-    return _features(found, moved, jacobian, known, np.array(rows))
+    return _features(fitted, moved, jacobian, known, np.array(rows))
 
 
 def _fit(windows: Sequence[Demodulated], values: Array, design: Array, columns: Array) -> Rivals | None:
@@ -378,28 +378,28 @@ def _fit(windows: Sequence[Demodulated], values: Array, design: Array, columns: 
     return fit_rivals(values[:, 0], design, columns, np.concatenate(weights), 2 * len(windows))
 
 
-def _features(found: Rivals, moved: Array, jacobian: Array, known: Mask, runs: Array) -> Features:
-    covariances = jacobian @ found.covariances @ jacobian.T
+def _features(fitted: Rivals, moved: Array, jacobian: Array, known: Mask, runs: Array) -> Features:
+    covariances = jacobian @ fitted.covariances @ jacobian.T
     variances = np.where(known, np.diag(covariances[0]), 1.0)
     stds = np.sqrt(np.maximum(variances, 1e-300))
     shifts = np.where(known, (moved - moved[0]) / stds, 0.0)
     covariances = covariances / np.outer(stds, stds)
     widths = np.sqrt(np.maximum(np.diagonal(covariances, axis1=1, axis2=2), 1e-12))
-    level = np.log(found.remaining / found.freedom + 0.05)
+    level = np.log(fitted.remaining / fitted.freedom + 0.05)
     rivals = np.column_stack(
         (
-            np.arcsinh(found.scores),
-            np.log(found.own + 1e-6),
+            np.arcsinh(fitted.scores),
+            np.log(fitted.own + 1e-6),
             level,
             level - level.min(),
             np.arcsinh(shifts),
             np.where(known, np.log(np.minimum(widths, 1e6)), 0.0),
         )
     )
-    rivals[~found.valid] = 0.0
-    shifts[~found.valid] = 0.0
+    rivals[~fitted.valid] = 0.0
+    shifts[~fitted.valid] = 0.0
     return Features(
-        rivals, runs, shifts, covariances, found.valid, np.where(known, moved[0], 0.0), stds, known
+        rivals, runs, shifts, covariances, fitted.valid, np.where(known, moved[0], 0.0), stds, known
     )
 
 

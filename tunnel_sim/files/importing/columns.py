@@ -180,7 +180,7 @@ def with_readings(tables: Sequence[Table], choices: ImportChoices, where: str) -
     Args:
         tables: in their order; a part with several clocks has its tables one after another.
     """
-    kept = []
+    remaining = []
     for _, group in groupby(tables, key=lambda table: (table.part, bool(table.native))):
         part = list(group)
         if part[0].native:
@@ -189,8 +189,8 @@ def with_readings(tables: Sequence[Table], choices: ImportChoices, where: str) -
             if not found:
                 _refuse_without_angle(block, where)
             part = [table for table in part if any(c.name in table.native for c in found)]
-        kept += part
-    return kept
+        remaining += part
+    return remaining
 
 
 def _apart(
@@ -303,29 +303,29 @@ def _readings(
     driving = stated_input(block, choices)
     others = [c for c in free if not is_input(c) and c is not driving]
     measured = [c for c in others if not names_command(c)]
-    level, found = _likeliest(measured)
+    level, readings = _likeliest(measured)
     if level >= _UNNAMED and level not in _LINEAR and len(measured) < len(others):
         twins = {without_command(c.name) for c in others if c not in measured}
         own = [c for c in measured if c.name.strip().lower() in twins]
-        if found and not own:
+        if readings and not own:
             command = next(one_line(c.name, 40) for c in others if c not in measured)
             what = f"'{command}' is a command by its name, and no column beside it is named as the angle"
             raise TunnelError(what, where=where, remedy=f"give --angle, one of {listed(measured)}")
-        found = own or _likeliest(others)[1]
-    widest = {unit: max(_span(c) for c in found if c.unit == unit) for unit in {c.unit for c in found}}
-    still = [c for c in found if _span(c) < _HARDLY * widest[c.unit]]
+        readings = own or _likeliest(others)[1]
+    widest = {unit: max(_span(c) for c in readings if c.unit == unit) for unit in {c.unit for c in readings}}
+    still = [c for c in readings if _span(c) < _HARDLY * widest[c.unit]]
     remarks = [f"'{stem(channel.name)}' is left out: it hardly moves" for channel in still]
-    found = [channel for channel in found if channel not in still]
-    while len(found) > 1 and (rate := _a_rate(found, time)) is not None:
+    readings = [channel for channel in readings if channel not in still]
+    while len(readings) > 1 and (rate := _a_rate(readings, time)) is not None:
         remarks.append(f"'{stem(rate.name)}' is left out: it is the rate of another column")
-        found.remove(rate)
-    of_runs = len({stem(c.name) for c in found}) == 1 and all(RUN_MARK.search(c.name) for c in found)
-    if len(found) > 1 and not of_runs:
-        what = f"{len(found)} columns may be the angle: {listed(found)}"
-        several = asking(f'--angle "{found[0].name}"', what, where, ", or another of them")
-        raise Unread(several, _pair(time, found[0]))
-    remarks += [f"angle from '{stem(channel.name)}'" for channel in found if len(others) > 1]
-    return found, remarks
+        readings.remove(rate)
+    of_runs = len({stem(c.name) for c in readings}) == 1 and all(RUN_MARK.search(c.name) for c in readings)
+    if len(readings) > 1 and not of_runs:
+        what = f"{len(readings)} columns may be the angle: {listed(readings)}"
+        several = asking(f'--angle "{readings[0].name}"', what, where, ", or another of them")
+        raise Unread(several, _pair(time, readings[0]))
+    remarks += [f"angle from '{stem(channel.name)}'" for channel in readings if len(others) > 1]
+    return readings, remarks
 
 
 def _likeliest(channels: Sequence[Channel]) -> tuple[int, list[Channel]]:

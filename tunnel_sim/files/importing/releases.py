@@ -319,27 +319,27 @@ def _piece(
     return RecordPiece(first, last, decay.doubt, held)
 
 
-def _judged(found: Sequence[_Decay], swings: Swings, reading: PerSample) -> list[_Decay]:
+def _judged(decays: Sequence[_Decay], swings: Swings, reading: PerSample) -> list[_Decay]:
     """The decays that are runs; with a doubt also the motion of something else.
 
     A brief motion is not a run if its frequency differs from the longest one's. Neither is a small motion off
     the centre of the longest one, just before a release: a hand holds the body there.
     """
-    if len(found) < 2:
-        return list(found)
-    lasts = np.array([decay.lasts(swings) for decay in found])
-    halves = lasts / [decay.count for decay in found]
-    sizes = np.array([swings.size[decay.start] for decay in found])
-    at = [reading[swings.at[decay.start : decay.start + decay.count + 1]] for decay in found]
+    if len(decays) < 2:
+        return list(decays)
+    lasts = np.array([decay.lasts(swings) for decay in decays])
+    halves = lasts / [decay.count for decay in decays]
+    sizes = np.array([swings.size[decay.start] for decay in decays])
+    at = [reading[swings.at[decay.start : decay.start + decay.count + 1]] for decay in decays]
     centres = np.array([float(np.median(0.5 * (turns[1:] + turns[:-1]))) for turns in at])
     most = int(np.argmax(lasts))
     brief = lasts < _BRIEF * lasts[most]
     other = (halves > _OTHER * halves[most]) | (halves < halves[most] / _OTHER)
     small = sizes < _SMALL * sizes[most]
-    following = np.append([found[k + 1].hand <= found[k].until for k in range(len(found) - 1)], [False])
+    following = np.append([decays[k + 1].hand <= decays[k].until for k in range(len(decays) - 1)], [False])
     beside = (np.abs(centres - centres[most]) > sizes) & following
     judged = []
-    for k, decay in enumerate(found):
+    for k, decay in enumerate(decays):
         if brief[k] and small[k] and (beside[k] or other[k]):
             continue
         if brief[k] and other[k]:
