@@ -32,7 +32,7 @@ READER_SECONDS = 20.0
 READER_PACE = 2.0**19
 """Slowest pace at which a library may read, bytes per s: workbooks, the slowest, are read at 2 MB/s."""
 READER_MEMORY = 4 * 2**30
-"""Most memory of the process in which a library reads, bytes, on Linux: the largest file fits in three times."""
+"""Maximum memory of the reading process, bytes, on Linux: enough for three times the largest file."""
 
 NESTING = 32
 """Deepest nesting of tables and lists: the formats need six levels, and Python's recursion limit is a thousand."""
