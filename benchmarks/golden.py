@@ -167,7 +167,10 @@ def _shown(recorded: Path, name: str, folder: Path) -> dict[str, str]:
 
 
 def changes(old: list[str], new: list[str], width: int = 160) -> list[str]:
-    """Changed lines, each from shortly before the first difference of its hunk: lines of a page are long."""
+    """The changed lines, cut because lines of a page are long.
+
+    Each begins shortly before the first difference of its hunk.
+    """
     found: list[str] = []
     for kind, a, b, c, d in difflib.SequenceMatcher(None, old, new, autojunk=False).get_opcodes():
         if kind != "equal":

@@ -90,7 +90,7 @@ def freedom_of(document: Document) -> Freedom:
 
 
 def names_in(document: Document) -> tuple[str, ...]:
-    """Names in an estimate that the user has chosen."""
+    """The names in an estimate that the user chose: of the campaign and of the runs."""
     return document["campaign"], *(run["id"] for run in document["runs"])
 
 

@@ -63,10 +63,10 @@ EFFECT_LISTED: Final = 0.01
 
 
 def sections(answer: Findings, campaign: Campaign | None = None) -> tuple[Section, ...]:
-    """The whole answer.
+    """The sections of the whole answer.
 
     Args:
-        campaign: adds the conditions of the runs.
+        campaign: the campaign, if the sections are to state the conditions of its runs.
     """
     blown = bool(campaign.in_wind) if campaign else answer.windy
     found = _sections(answer, campaign, blown=blown)

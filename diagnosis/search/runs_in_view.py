@@ -111,7 +111,7 @@ class RunsInView:
         return True
 
     def for_whole_runs(self, likely: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
-        """Likely sets fitted to whole runs, if these show noise beside a set that the view cannot show."""
+        """The likely sets fitted to whole runs if these show scatter or a random moment, and the view cannot."""
         del likely
         return ()
 

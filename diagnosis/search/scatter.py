@@ -134,11 +134,13 @@ def differing(fitted: Fit, places: Sequence[int], kinds: Sequence[type[Effect]])
 def with_own_linear_terms(fitted: Fit, kinds: Sequence[type[Effect]]) -> tuple[Problem, Point] | None:
     """The problem of a fit with the widest possible deviations of every run, at the fit's point.
 
-    A run then determines an effect only by what its spring and damping cannot imitate; None where the runs may
-    not differ.
+    With these deviations, a run determines only the part of an effect that its spring and damping cannot imitate.
 
     Args:
         kinds: the effects that may be named.
+
+    Returns:
+        The problem and the point; None if the runs may not differ.
     """
     widest = _with_widest(*without_deviations(fitted), fitted, kinds)
     return None if widest is None else (widest[0], _same_deviations(*widest, fitted))

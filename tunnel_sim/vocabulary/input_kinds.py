@@ -147,7 +147,7 @@ class Moment(InputKind):
     amplitudes = "amplitudes_nm"
 
     def holds(self, name: str, unit: str) -> bool:
-        """By the column's name, or a unit of moment."""
+        """Whether the column's name is of this kind, or its unit is a unit of moment."""
         return super().holds(name, unit) or unit.strip().lower() in _MOMENTS
 
 

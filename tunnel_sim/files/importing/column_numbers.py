@@ -159,8 +159,8 @@ def _ask_for_unit(channel: Channel, kinds: Sequence[str], option: str, where: st
 def refuse_without_unit(channels: Sequence[Channel], where: str) -> None:
     """Refuse columns named as rates or accelerations without a stated unit.
 
-    Their size does not separate rad/s from deg/s, as an angle's separates rad from deg: a rate has no greatest
-    value.
+    The size of an angle shows whether it is in rad or deg. The size of a rate does not, since a rate has no
+    greatest value.
     """
     kinds = {channel: named_kind(channel.name) for channel in channels if not channel.unit}
     first = next(filter(None, kinds.values()), "")
