@@ -286,7 +286,7 @@ def noise_statuses(levels: Sequence[NoiseLevel | None]) -> set[Status]:
 
 
 def design_statuses(design: Design, parameters: Array) -> set[Status]:
-    """The statuses of a campaign with conditions that do not separate parameters, or contradict them.
+    """The statuses for parameters that the campaign's conditions cannot separate, and for an impossible inertia.
 
     Args:
         parameters: estimated φ, shape (p,).
