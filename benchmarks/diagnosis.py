@@ -47,7 +47,7 @@ CAUSES = {
     ),
 }
 STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS.value
-UNBOUNDED = 1e3  # bounds for sysid where a parameter has none
+UNBOUNDED = 1e3  # bounds for sysid if a parameter has none
 STEP = 4e-3  # s, on both sides of the comparison
 
 
@@ -96,7 +96,7 @@ def full_size(console: Console) -> None:
 
 
 class SysidFit:
-    """One candidate as a problem of `mujoco.sysid`: its parameters, residual and optimiser, with our MuJoCo model.
+    """One candidate as a problem for `mujoco.sysid`: its parameters, residual and optimiser, with our MuJoCo model.
 
     sysid takes releases as fixed and measures at a model's sensors. Here releases are parameters, written by a
     custom rollout, and the sensor's zero and effects on the reading modify the residual; both are extension points
@@ -178,7 +178,7 @@ class SysidFit:
         found = []
         for k, model in enumerate(models):
             state = np.vstack([states[k], moved[k]])
-            # after a step the sensors have the values of its start, and the state those of its end
+            # after a step the sensors have the values at its start, and the state has the values at its end
             data = np.zeros((count, model.nsensordata))
             data[:, 0] = state[:, angle_at]
             times = STEP * np.arange(count)

@@ -1,9 +1,9 @@
 """The share of campaigns in which a disturbed run is named and the causes are exactly right.
 
-Run as ``python -m benchmarks.disturbed FOLDER --seed N --count C``. Campaigns of the reference simulator have up to
-two causes, and one run of each has a blow, a push or a bump of the reading. With ``--undisturbed`` there is no
-disturbance; only the falsely named runs are counted, without a search for causes. Every answer is appended to
-``answers.jsonl`` in the folder; a second call continues.
+Run as ``python -m benchmarks.disturbed FOLDER --seed N --count C``. Campaigns of the reference simulator have
+up to two causes, and one run of each has a blow, a push or a bump of the reading. With ``--undisturbed`` there
+is no disturbance; only the falsely named runs are counted, without a search for causes. Every answer is
+appended to ``answers.jsonl`` in the folder; a second call continues.
 """
 
 from __future__ import annotations

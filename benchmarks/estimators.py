@@ -120,7 +120,7 @@ def measure(methods: dict[str, Method], count: int, seed: int) -> dict[str, Tall
 
 
 def rms(values: Iterable[float]) -> float:
-    """Root mean square; NaN where there are none."""
+    """Root mean square; NaN if there are none."""
     squares = np.square(list(values))
     return float(np.sqrt(squares.mean())) if squares.size else np.nan
 

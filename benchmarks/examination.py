@@ -19,7 +19,7 @@ from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
 
 NOT_SLIPS = {SpringOffTheLine.__name__, InertiaOffTheSprings.__name__}
-"""Slips that may as well be effects."""
+"""Slips that may also be effects."""
 
 
 @dataclass

@@ -1,4 +1,4 @@
-"""The golden set: all faces of the same diagnoses, so that a change of the code can be shown to change nothing.
+"""The golden set: all presentations of the same diagnoses, to show that a change of the code changes nothing.
 
 Run as ``python -m benchmarks.golden write FOLDER``, ``faces FOLDER OUT`` or ``compare A B``; see README.md.
 """
@@ -46,7 +46,7 @@ LONG = ("driven-emps", "driven-silverbox")
 """Campaigns that take more than a minute of processor time: only with ``--all``."""
 SEALED = 40
 VARYING = ("versions", "sha256")
-"""What the provenance of a document has of the machine and the day."""
+"""The part of a document's provenance that depends on the machine and the day."""
 MODEL, JOINT = "model.xml", "elbow"
 """A campaign with this file beside it is diagnosed with this joint of the model."""
 Document = dict[str, Any]
@@ -60,7 +60,7 @@ def normalised(document: Document) -> Document:
 
 
 def faces(document: Document, campaign: Campaign) -> dict[str, str]:
-    """What a person is shown of a normalised document, by the name of its file."""
+    """All presentations of a normalised document, by file name."""
     answer, shown = Diagnosis.from_json_dict(document), io.StringIO()
     blocks = printed(answer)
     with contextlib.redirect_stdout(shown):
@@ -74,7 +74,7 @@ def faces(document: Document, campaign: Campaign) -> dict[str, str]:
 
 
 def answers(folder: Path) -> dict[str, str]:
-    """All files of a campaign; the text of a refusal is an answer too."""
+    """All files of a campaign; the text of a refusal is also an answer."""
     found, campaign = {}, read_campaign(folder)
     try:
         diagnosis = diagnose(campaign, model=own_model(folder, campaign))
@@ -95,12 +95,12 @@ def answers(folder: Path) -> dict[str, str]:
 
 
 def refused(error: Exception) -> str:
-    """A refusal in its words, and any other error with its type."""
+    """A refusal in its words; any other error with its type."""
     return f"{error}\n" if isinstance(error, TunnelError) else f"{type(error).__name__}: {error}\n"
 
 
 def faces_again(recorded: Path, folder: Path) -> dict[str, str]:
-    """The faces of a recorded document, with the runs as the diagnosis had them."""
+    """The presentations of a recorded document, with the runs of its diagnosis."""
     file = recorded / "document.json"
     if not file.exists():
         return {}
@@ -111,17 +111,17 @@ def faces_again(recorded: Path, folder: Path) -> dict[str, str]:
 
 
 def own_model(folder: Path, campaign: Campaign) -> JointModel | None:
-    """The model beside the campaign; None where there is none."""
+    """The model beside the campaign; None if there is none."""
     return read_model(folder / MODEL, JOINT, campaign) if (folder / MODEL).exists() else None
 
 
 def as_json(document: Document) -> str:
-    """Indented, in the order of the document."""
+    """A document as indented JSON, in its order."""
     return json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def make_campaigns(folder: Path) -> None:
-    """Write the simulated campaigns and the blind sets that are not there yet."""
+    """Write the missing simulated campaigns and blind sets."""
     for name, campaign, xml in simulated():
         place = folder / f"rig-{name}"
         if not place.exists():
@@ -167,7 +167,10 @@ def _shown(recorded: Path, name: str, folder: Path) -> dict[str, str]:
 
 
 def changes(old: list[str], new: list[str], width: int = 160) -> list[str]:
-    """Changed lines, each from shortly before the first difference of its hunk: lines of a page are long."""
+    """The changed lines, cut because lines of a page are long.
+
+    Each begins shortly before the first difference of its hunk.
+    """
     found: list[str] = []
     for kind, a, b, c, d in difflib.SequenceMatcher(None, old, new, autojunk=False).get_opcodes():
         if kind != "equal":
@@ -179,9 +182,9 @@ def changes(old: list[str], new: list[str], width: int = 160) -> list[str]:
 
 
 def compare(one: Path, other: Path, lines: int) -> int:
-    """Print for each campaign and file whether it is the same, and return the number of differences.
+    """Print for each campaign and file whether it is unchanged, and return the number of differences.
 
-    Of a folder of ``faces``, which has no documents, only the files that both have are compared.
+    For folders of ``faces``, which have no documents, only the files that both have are compared.
     """
     names = sorted({p.parent.name for folder in (one, other) for p in folder.glob("*/*.*") if p.is_file()})
     same = differing = 0

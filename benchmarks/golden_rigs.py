@@ -1,4 +1,4 @@
-"""Campaigns of the golden set beside the usual rig, simulated from a fixed seed without the diagnosis's code."""
+"""Campaigns of the golden set with unusual rigs, simulated from a fixed seed without the diagnosis's code."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SEED = 71
 
 
 def simulated() -> Iterator[tuple[str, Campaign, str]]:
-    """Rigs beside the usual one: name, campaign, and MJCF of a model of one's own or nothing."""
+    """Unusual rigs: name, campaign, and MJCF of a user's model or nothing."""
     for name, joint, axis in (
         ("joint", TRUE, "0 0 1"),
         ("joint-rubs", RUBS, "0 0 1"),

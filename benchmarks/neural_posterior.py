@@ -32,7 +32,7 @@ from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, SensorProper
 NAMES = ("cn_beta", "cn_r")
 MODERATE = (1.0, 10.0)  # excess in noise variances
 METHODS = ("output_error", "neural_posterior")
-BAND = 1.358  # of Kolmogorov's statistic times the root of the number
+BAND = 1.358  # 95 % point of Kolmogorov's statistic times the root of the number
 FAR = 3.0  # error in stated standard deviations above which an estimate should be refused
 Row = dict[str, Any]
 

@@ -1,9 +1,10 @@
-"""Campaigns with one odd run: the share in which it is named, and in which a false cause is decided.
+"""Campaigns with one odd run: the share in which it is named, and the share in which a false cause is decided.
 
-Run as ``python -m benchmarks.odd_runs --seed S --campaigns N``. Half of the campaigns are of the reference
-simulator, half of the forward one, with no, one or two causes. One run of each is spoilt in one of seven ways.
-With ``--without`` no run is spoilt, and the answers lost and the runs named falsely are counted. ``--answers FILE``
-appends every answer to a file, and continues there. Thresholds are chosen on seeds below 1000, tested on others.
+Run as ``python -m benchmarks.odd_runs --seed S --campaigns N``. Half of the campaigns are from the reference
+simulator, half from the forward one, with no, one or two causes. One run of each is spoilt in one of seven
+ways. With ``--without`` no run is spoilt, and the lost answers and the falsely named runs are counted.
+``--answers FILE`` appends every answer to a file, and continues there. Thresholds are chosen on seeds below
+1000, tested on others.
 """
 
 from __future__ import annotations
@@ -32,10 +33,10 @@ from tunnel_sim.vocabulary.record import Array, Record
 KINDS = ("none", "single", "pair")
 _SPRINGS, _SPEEDS = (16.12, 30.5, 44.84), (0.0, 12.0, 18.0, 25.0)
 _RATE = 250.0  # Hz, of the forward simulator's campaigns
-_SIZES = (0.5, 2.0)  # of their causes, in multiples of the effect's example
+_SIZES = (0.5, 2.0)  # sizes of their causes, in multiples of the effect's example
 
 
-# ---- what happens to one run: new times and readings from the old ones ----
+# ---- faults of one run: new times and readings from the old ones ----
 
 
 def held(rng: np.random.Generator, time_s: Array, yaw: Array) -> tuple[Array, Array]:
@@ -61,7 +62,7 @@ def low_passed(rng: np.random.Generator, time_s: Array, yaw: Array) -> tuple[Arr
 
 
 def in_degrees(rng: np.random.Generator, time_s: Array, yaw: Array) -> tuple[Array, Array]:
-    """Radians are taken for degrees, or the reverse."""
+    """Radians are mistaken for degrees, or the reverse."""
     return time_s, yaw * (np.pi / 180.0) ** rng.choice([-1.0, 1.0])
 
 
@@ -134,8 +135,8 @@ class Made:
 
     Args:
         effects: true causes, sorted.
-        fault: what happened to one run; empty: nothing.
-        run: id of that run; empty without one.
+        fault: fault of one run; empty: none.
+        run: id of that run; empty without a fault.
     """
 
     campaign: Campaign
@@ -146,7 +147,7 @@ class Made:
 
 
 def made(count: int, seed: int, *, odd: bool) -> list[Made]:
-    """Campaigns of both simulators in turn, the same for the same arguments.
+    """Campaigns from both simulators in turn; equal arguments give equal campaigns.
 
     Args:
         odd: whether one run of each is spoilt.
@@ -265,12 +266,12 @@ def _scored(answer: Diagnosis) -> dict[str, Any]:
 
 
 def right_run(one: Mapping[str, Any]) -> bool:
-    """Whether exactly the odd run is named; without one, whether none is."""
+    """Whether exactly the odd run is named; without an odd run, whether none is named."""
     return bool(one["named"] == ([one["truth"]["run"]] if one["truth"]["run"] else []))
 
 
 def false_causes(one: Mapping[str, Any]) -> list[str]:
-    """Decided causes that are false; scatter is false too, since the runs repeat."""
+    """Decided causes that are false; scatter is also false, since the runs repeat."""
     if not one["decided"] or one["causes"] == ["unknown"]:
         return []
     return sorted(set(one["causes"]) - set(one["truth"]["effects"]))

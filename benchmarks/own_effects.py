@@ -1,4 +1,4 @@
-"""Speed of one law three ways, built in, as a class and as an expression, and of a law with an exponential.
+"""Speed of one law in three forms, built in, as a class and as an expression, and of a law with an exponential.
 
 Run as ``python -m benchmarks.own_effects`` from the root; see README.md beside it.
 """
@@ -53,7 +53,7 @@ def integrating(effect: Effect) -> Callable[[], float]:
 
 
 def speeds(repetitions: int) -> Table:
-    """Steps per second of each form relative to the built-in one."""
+    """Steps per second of each form relative to the built-in form."""
     heads = ("subject", "baseline", "subject", "ratio (median)", "ratio (best)", "target")
     table = Table(
         *heads, title="Cubic stiffness built in (baseline) against other forms, RK4 steps per second"

@@ -40,8 +40,8 @@ from tunnel_sim.vocabulary.record import Array, Record
 
 NAMES = ("zeta", "omega_n")
 PERIODS, BLOCKS = 40, 16
-UNIT = 1e-3  # of ζ and of the relative frequency, for a whole record
-DRAWS = 1000  # samples of each posterior
+UNIT = 1e-3  # unit of ζ and of the relative frequency, for a whole record
+DRAWS = 1000  # number of samples of each posterior
 BATCH = 100
 
 

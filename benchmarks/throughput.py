@@ -114,7 +114,7 @@ def interleaved(
 
 
 def ratio(one: list[float], other: list[float]) -> tuple[float, float]:
-    """Speed of the second relative to the first: median over repetitions, and of the best times."""
+    """Speed of the second relative to the first: median over repetitions, and ratio of the best times."""
     return median(a / b for a, b in zip(one, other, strict=True)), min(one) / min(other)
 
 

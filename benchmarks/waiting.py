@@ -35,12 +35,12 @@ from tunnel_sim.vocabulary.record import Record
 
 GROWTH = (12, 48, 144)  # runs
 FRICTION = 0.004  # N m
-#: A link that moves up and down, of which a user's model lacks the rotor and the losses of the gear.
+#: A link that moves up and down; the user's model lacks the rotor and the losses of the gear.
 ARM = """<mujoco><option timestep="0.001" integrator="RK4"/><worldbody><body>
 <joint name="elbow" axis="0 1 0" {}/><geom type="capsule" fromto="0 0 0 0.4 0 0" size="0.02" mass="1.5"/></body>
 </worldbody><actuator><motor name="motor" joint="elbow" gear="20"/></actuator></mujoco>"""
 GEAR = 'armature="0.05" damping="0.4" frictionloss="0.6" solreffriction="0.002 1"'
-LATE = 12  # samples by which the motor acts late, ms
+LATE = 12  # number of samples by which the motor acts late, ms
 #: The beginning of the code of a process.
 HERE = "import json, os, sys, time; sys.path.insert(0, os.getcwd())\n"
 #: Prints the modules imported by a diagnosis of a folder without a gap.
@@ -221,7 +221,7 @@ def diagnosed(name: str, folder: Path, *model: str) -> Iterator[Measurement]:
 
 
 def waited(folder: Path) -> Iterator[Measurement]:
-    """Wall time of `tunnel diagnose`, and the part of the imports."""
+    """Wall time of `tunnel diagnose`, and the share of the imports."""
 
     def command(tree: Path) -> float:
         return elapsed([python_of(tree), "-m", "tunnel_lab", "diagnose", str(folder)], tree)
@@ -266,7 +266,7 @@ def on_paper(tree: Path, folder: Path, rate: float) -> list[str]:
     """The least integration of a diagnosis, one pass through all runs for each step of its fits.
 
     Args:
-        rate: of the bare integrator, ns per step.
+        rate: time of the bare integrator, ns per step.
     """
     found: Mapping[str, Mapping[str, float]] = json.loads(printed(tree, STEPS, str(folder)))
     counts = found["counts"]

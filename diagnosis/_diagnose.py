@@ -49,18 +49,18 @@ def diagnose(
     """Find where the nominal model departs from the runs, which effect causes it, and the share that it explains.
 
     Args:
-        campaign: the runs; or their folder, or one file of a data logger.
+        campaign: the runs, their folder, or one file of a data logger.
         leave_out: ids of runs to leave out; a remark and ``provenance`` name them.
         kinds: the effects to answer with, registered or not; None: all known ones.
         progress: called with the name of each step.
-        model: your own model, from `read_model`, whose joint is then the nominal model; or a nominal model of your
-            own kind.
+        model: your own model, from `read_model`: its joint is then the nominal model; or a nominal model of
+            your own kind.
         settings: the numbers that weigh answers, and the rates of the tests.
-        rivals: causes from outside the vocabulary, weighed with it; their probability is added to
+        rivals: causes from outside the vocabulary, weighed with the effects; their probability is added to
             ``unknown``.
 
     Returns:
-        The answer, for the runs that one model can be fitted to; its cautions name the others.
+        The answer for the runs that one model can be fitted to; its cautions name the other runs.
 
     Raises:
         TunnelError: when the examination refuses the records, a run shows no decaying motion, the nominal model
@@ -94,7 +94,8 @@ def _diagnosed(
     """The answer in the units of an angle, without its texts; other arguments as in `diagnose`.
 
     Args:
-        models: the user's joint, whose law the campaign then has, and the nominal model; None: that of its kind.
+        models: the user's joint, which gives the campaign its law, and the nominal model; None: the model of
+            its kind.
     """
     joint, own = models
     campaign, short = without_short(campaign)
@@ -144,7 +145,7 @@ def _without_outlier(
 
 
 def _explained_without(others: Study, study: Study) -> bool:
-    """Whether the gap vanishes without the runs that one study leaves out and another does not.
+    """Whether the gap vanishes without the runs that only one of two studies leaves out.
 
     A run that alone has its wind state or its spring may differ for that reason.
     """
@@ -180,12 +181,12 @@ def read_model(
 
     Args:
         path: MJCF, or URDF that MuJoCo loads.
-        joint: name of the joint recorded, the only one that moves.
+        joint: name of the recorded joint, the only one that moves.
         campaign: its records give the range of the joint.
         free: parameters to fit, of ``inertia``, ``damping``, ``stiffness`` and ``rest``; None: all that matter.
             For a joint without a spring, ``rest`` is a constant moment.
-        asset_dir: a further folder for its includes and meshes, beside the model's own.
-        actuator: name of the actuator whose control is the column ``drive``; None: the joint has only one.
+        asset_dir: a further folder for the model's includes and meshes, beside the model's own.
+        actuator: name of the actuator with the column ``drive`` as its control; None: the joint has only one.
 
     Returns:
         The model with the law of its joint.
@@ -193,7 +194,7 @@ def read_model(
     Raises:
         TunnelError: when the model cannot be the nominal model of the campaign.
     """
-    from tunnel_sim.engine.joint_model import read_joint_model  # only here: MuJoCo is slow to load
+    from tunnel_sim.engine.joint_model import read_joint_model  # imported here because MuJoCo is slow to load
 
     assets = None if asset_dir is None else Path(asset_dir)
     return read_joint_model(Path(path), joint, recorded(campaign, actuator), free, assets)

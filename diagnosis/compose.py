@@ -82,13 +82,13 @@ _PACKAGES = ("virtual-wind-tunnel", "mujoco", "numpy", "scipy")
 
 @dataclass(frozen=True)
 class Question:
-    """The question beside the runs.
+    """The question of a diagnosis, apart from the runs.
 
     Args:
-        joint: the user's model of a joint, into which causes are written; None: none.
+        joint: the user's model of a joint, in which the causes are written; None: none.
         remarks: on runs that were left out before the examination.
         left_out: ids of the runs left out on request.
-        say: told of each step.
+        say: called with the name of each step.
     """
 
     joint: JointModel | None
@@ -99,7 +99,7 @@ class Question:
 
 @dataclass(frozen=True, eq=False)
 class Confirmed:
-    """A study whose causes the held-out readings confirm.
+    """A study with causes that the held-out readings confirm.
 
     Args:
         repeats: repeatability of the runs, in the units of the similar campaign; None for a single run, or a body
@@ -121,10 +121,10 @@ class Confirmed:
 
 @dataclass(frozen=True)
 class _Named:
-    """The answer itself: causes, place, probabilities, coefficients.
+    """The answer in numbers: causes, place, probabilities, coefficients.
 
     Args:
-        immaterial: by coefficient, its relative change by the causes, where they change none materially.
+        immaterial: by coefficient, the relative change by the causes if none is material.
     """
 
     causes: tuple[str, ...]
@@ -140,7 +140,7 @@ class _Named:
 
     @property
     def unsure(self) -> bool:
-        """Whether runs of free decays leave the answer undecided, or no effect is the likeliest answer."""
+        """Whether free decays leave the answer undecided, or ``no effect`` is the most likely answer."""
         return not self.limit_cycles and (not self.decision.decided or _unknown(self.candidates))
 
 
@@ -151,7 +151,7 @@ def composed(
 
     Args:
         chosen: the examined campaign, its effects and its model.
-        without_outlier: the answer from the other runs, where one deviates far beyond them; None: not known.
+        without_outlier: the answer from the other runs, if one run is an outlier; None: not known.
     """
     study, closes, repeats = answered.study, answered.closes, answered.repeats
     patched, unpatched = (None, ()) if asked.joint is None else _patched(study, asked.joint)
@@ -242,7 +242,7 @@ def _caveats(
 
 
 def _beside(study: Study, chosen: Chosen, named: _Named, caveats: tuple[Fact, ...]) -> Found:
-    """The facts of an answer that are not numbers of it."""
+    """The facts of an answer that are not numeric results."""
     data, noise = study.nominal.problem.data, study.prepared.noise
     unknown = named.unsure and _unknown(named.candidates)
     return Found(
@@ -271,7 +271,7 @@ def _beside(study: Study, chosen: Chosen, named: _Named, caveats: tuple[Fact, ..
 
 
 def _unknown(weighed: Sequence[Candidate]) -> bool:
-    """Whether no effect is the likeliest answer: below one half a set of effects may come first nevertheless."""
+    """Whether ``no effect`` is the most likely answer; below one half, a set of effects may still come first."""
     odds = {candidate.effect: candidate.probability for candidate in weighed}
     return max(odds, key=odds.__getitem__, default="") in UNKNOWN
 
@@ -279,10 +279,10 @@ def _unknown(weighed: Sequence[Candidate]) -> bool:
 def localise(study: Study, explained: float = 0.0) -> tuple[Where, Maps, PlaceFound | Nowhere]:
     """Locate the departure of the nominal model from the runs: the place, its maps, the reason.
 
-    The place follows from the residuals alone. The causes only have to agree with it.
+    The place follows from the residuals alone; the causes are only compared with it.
 
     Args:
-        explained: share of the gap that they explain on held-out readings.
+        explained: share of the gap that the causes explain on held-out readings.
     """
     place, chosen = study.gap.place or study.prepared.place(), study.settings.where
     survey = place.survey
@@ -294,7 +294,7 @@ def localise(study: Study, explained: float = 0.0) -> tuple[Where, Maps, PlaceFo
         )
     if not study.causes:
         return Where(None, None), maps, nowhere(survey, within_step=study.gap.test.within_step)
-    compared = (*study.fitted, *study.read_off) if study.named else ()  # the whole set is judged
+    compared = (*study.fitted, *study.read_off) if study.named else ()  # the set is judged as a whole
     where = Where(
         channel=place.channel.value,
         condition=place.condition.value,
@@ -360,7 +360,7 @@ def _named(
 
 
 def _cycling(gap: GapSummary, remarks: Sequence[Remark], chosen: AnswerSettings) -> _Named:
-    """The answer ``unknown`` without coefficients, where every run is in a limit cycle."""
+    """The answer ``unknown`` without coefficients, for runs that are all in a limit cycle."""
     return _Named(
         causes=UNKNOWN,
         where=Where(None, None, tuple(run.id for run in gap.runs)),
@@ -390,7 +390,7 @@ def _predictions(
 
 
 def _identified(study: Study, chosen: Chosen) -> Estimate | None:
-    """The estimate by `identify`; None where a cause acts, or it would be of another model or other runs."""
+    """The estimate by `identify`; None if a cause acts, or the estimate would be of another model or other runs."""
     scatter_alone = study.causes != UNKNOWN and all(
         issubclass(effect_class(name), BetweenRuns) for name in study.causes
     )
@@ -399,13 +399,13 @@ def _identified(study: Study, chosen: Chosen) -> Estimate | None:
         return None
     try:
         return identify(chosen.campaign.as_angle, throw=False)
-    except TunnelError:  # the examination refuses what the diagnosis may still compare
+    except TunnelError:  # the examination refuses runs that the diagnosis may still compare
         return None
 
 
 def _patched(study: Study, model: JointModel) -> tuple[PatchedModel | None, tuple[Fact, ...]]:
     """The model with the causes written into it; None with a caveat where that fails."""
-    from diagnosis.patch.patched_model import patched_model  # only here: MuJoCo is slow to load
+    from diagnosis.patch.patched_model import patched_model  # imported here because MuJoCo is slow to load
 
     try:
         return patched_model(study, model), ()
@@ -414,7 +414,7 @@ def _patched(study: Study, model: JointModel) -> tuple[PatchedModel | None, tupl
 
 
 def _of_model(study: Study, unpatched: tuple[Fact, ...]) -> tuple[Fact, ...]:
-    """Caveats on the view of the search, the model and the patch, and a gap beyond every effect."""
+    """Caveats on the view of the search, the model and the patch, and on a gap beyond every effect."""
     return (
         *((Fact(study.caution),) if study.caution else ()),
         *map(as_stated, gain_words(study.campaign, study.chosen)),
@@ -444,7 +444,7 @@ def _remains(study: Study, after: Mapping[str, Quantity], answers: Answers, step
 
 
 def _rivals(study: Study) -> list[Answer]:
-    """The probable answers beside the first that do not contain it; none where nothing is named."""
+    """The probable answers beside the first that do not contain it; none if nothing is named."""
     return [
         answer
         for answer in study.answers[1:]
@@ -467,20 +467,20 @@ def _noise(study: Study) -> NoiseSummary:
 
 
 def _closable(study: Study, named: _Named, say: Progress) -> tuple[Closable | None, tuple[Fact, ...]]:
-    """The explainable part of the remainder, and a caveat where it is not sought or not found."""
+    """The explainable part of the remainder, and a caveat if it is not sought or not found."""
     decided, way = named.decision.decided, way_for(study)
     say("remainder")
     # in an undecided diagnosis the whole gap remains
     significant = not decided or (named.rest is not None and named.rest.significant)
     try:
-        with np.errstate(over="raise"):  # a fitted model that runs away
+        with np.errstate(over="raise"):  # a fitted model may diverge
             left = way.closable(study, significant=significant, decided=decided)
-    except (np.linalg.LinAlgError, FloatingPointError):  # the answer is given without it
+    except (np.linalg.LinAlgError, FloatingPointError):  # the answer is given without this part
         return None, (Fact("remainder not solved"),)
     return left, (Fact(way.caution),) if way.caution else ()
 
 
 def _second_modes(study: Study, chosen: Chosen) -> tuple[TwoModes, ...]:
-    """Second modes of single runs, where one may be named: sets of stretches have none."""
+    """Second modes of single runs, if one may be named: sets of stretches have none."""
     able = any(issubclass(kind, SecondOscillation) for kind in study.prepared.kinds)
     return second_modes(chosen.campaign) if able else ()

@@ -1,4 +1,4 @@
-"""The runs of a campaign that can be diagnosed together, and the effects for them; the rest is refused."""
+"""The runs of a campaign that can be diagnosed together, and their effects; other runs are refused."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ from tunnel_sim.vocabulary.errors import TunnelError, counted
 OTHER_MODE: Final = 1.5
 """Minimum ratio of the frequencies with and without wind at which a run counts as another mode. Judgement."""
 SAME_SPRING: Final = 1.1
-"""Maximum ratio of the frequencies at one wind speed between runs of one spring. Judgement. The stiffnesses
-then differ by a fifth. Effects of the amplitude change a frequency gradually, and seldom by this much."""
+"""Maximum ratio of the frequencies of one spring's runs at one wind speed. Judgement. The stiffnesses then
+differ by a fifth. Effects of the amplitude change a frequency gradually, and seldom by as much."""
 
 _LEFT_OUT = "left out of the diagnosis, which compares free decays"
 
@@ -45,7 +45,7 @@ class Diagnosable:
     """The runs to diagnose.
 
     Args:
-        limit_cycles: whether all are in limit cycles, so that no decay remains.
+        limit_cycles: whether all runs are in limit cycles, so that no decay remains.
     """
 
     campaign: Campaign
@@ -56,10 +56,11 @@ class Diagnosable:
 def diagnosable(campaign: Campaign, *, judged: bool = True) -> Diagnosable:
     """Examine a campaign, and separate its free decays from runs in a limit cycle.
 
-    Where all are in one, their whole records are kept.
+    If all runs are in limit cycles, their whole records are kept.
 
     Args:
-        judged: whether stated values are judged by the rig's own model; a model of your own may have others.
+        judged: whether stated values are judged by the rig's own model; a model of your own may have other
+            values.
 
     Raises:
         TunnelError: when the examination refuses the records.
@@ -88,8 +89,8 @@ class Chosen:
 
     Args:
         examined: all runs with the right kind of motion.
-        campaign: runs that one model can be fitted to.
-        model: that model.
+        campaign: the runs that one model can be fitted to.
+        model: the model fitted to these runs.
         kinds: the effects to answer with; none where all runs are in limit cycles.
         left_out: runs and effects that were left out, with reasons.
     """
@@ -119,49 +120,49 @@ def choose(
     Raises:
         TunnelError: when the examination refuses the records, or a run shows no motion that can be diagnosed.
     """
-    found = diagnosable(campaign, judged=judged)
-    if not found.limit_cycles:
-        refuse_motionless(found.campaign, nominal_model(found.campaign, given))
-    compared, left_out = comparable_runs(found.campaign)
+    usable = diagnosable(campaign, judged=judged)
+    if not usable.limit_cycles:
+        refuse_motionless(usable.campaign, nominal_model(usable.campaign, given))
+    compared, left_out = comparable_runs(usable.campaign)
     model = nominal_model(compared, given)
     if compared.sensor.derivative:
-        # Their sizes and ranges are angles; a mode moves the body.
+        # the sizes and ranges of these effects are angles; a mode moves the body
         kinds = [kind for kind in kinds if kind.channel != "sensor" or issubclass(kind, SecondOscillation)]
         tried = "no sensor effect tried" if compared.driven else "only a second mode tried"
         left_out = (*left_out, Fact(tried, {"quantity": compared.sensor.quantity}))
     kinds, said_of_drive = kinds_for(compared, kinds, model)
     left_out = (*left_out, *map(as_stated, (*said_of_drive, *model.notes())))
-    known = () if found.limit_cycles else kinds
-    return Chosen(found.campaign, compared, model, known, found.remarks, left_out, found.limit_cycles)
+    known = () if usable.limit_cycles else kinds
+    return Chosen(usable.campaign, compared, model, known, usable.remarks, left_out, usable.limit_cycles)
 
 
 def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[Fact, ...]]:
     """Leave out the runs that cannot be fitted together with the others, with reasons.
 
-    Where some runs state ``spring_stiffness`` and others do not, the larger group remains (if equal, the runs that
-    state it). Of runs that do not state it, only runs with the same frequency at the same wind speed remain: they
-    can have one spring. A wind-on run that swings in another mode than the wind-off runs of its spring is left
-    out.
+    If some runs state ``spring_stiffness`` and others do not, the larger group remains (if equal, the runs that
+    state it). Of the runs that do not state it, those with the same frequency at the same wind speed remain:
+    they can have one spring. A wind-on run that swings in another mode than the wind-off runs of its spring is
+    left out.
     """
     stated = [run for run in campaign.runs if run.spring_stiffness is not None]
     bare = [run for run in campaign.runs if run.spring_stiffness is None]
     left_out = []
-    kept, derivative = stated if len(stated) >= len(bare) else bare, campaign.sensor.derivative
+    compared, derivative = stated if len(stated) >= len(bare) else bare, campaign.sensor.derivative
     if stated and bare:
-        other, why = (bare, "stiffness not stated") if kept is stated else (stated, "stiffness stated")
+        other, why = (bare, "stiffness not stated") if compared is stated else (stated, "stiffness stated")
         left_out.append(Fact(why, {"runs": [run.id for run in other]}))
-    if kept is bare:
+    if compared is bare:
         same = _of_one_spring(bare, derivative, SAME_SPRING)
         if len(same) < len(bare):
             left_out.append(Fact("other springs", {"runs": [run.id for run in bare if run not in same]}))
-        kept = same
+        compared = same
     still: dict[float | None, list[float]] = defaultdict(list)
-    for run in kept:
+    for run in compared:
         if not run.wind_on:
             still[run.spring_stiffness].append(free_frequency(run, derivative))
     elsewhere = [
         run
-        for run in kept
+        for run in compared
         if run.wind_on
         and run.spring_stiffness in still
         and free_frequency(run, derivative) > OTHER_MODE * median(still[run.spring_stiffness])
@@ -169,8 +170,8 @@ def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[Fact, ...]]:
     if elsewhere:
         figures = {"ratio": OTHER_MODE, "runs": [run.id for run in elsewhere]}
         left_out.append(Fact("another mode", figures))
-        kept = [run for run in kept if run not in elsewhere]
-    order = {run.id for run in kept}
+        compared = [run for run in compared if run not in elsewhere]
+    order = {run.id for run in compared}
     return replace(campaign, runs=tuple(run for run in campaign.runs if run.id in order)), tuple(left_out)
 
 
@@ -188,26 +189,26 @@ def _of_one_spring(runs: Sequence[Run], derivative: int, ratio: float) -> list[R
     setting = speed_groups(run.wind_speed for run in runs)
     for run in runs:
         by_speed[setting[run.wind_speed]].append((free_frequency(run, derivative), run))
-    # by speed, groups of runs with about the same frequency, lowest first
+    # by wind speed, groups of runs with similar frequency, lowest first
     groups: list[list[list[Run]]] = []
     for alike in by_speed.values():
         ranked = sorted(alike, key=lambda pair: pair[0])
-        found = [[ranked[0][1]]]
+        clusters = [[ranked[0][1]]]
         for (last, _), (now, run) in itertools.pairwise(ranked):
             if now > ratio * last:
-                found.append([])
-            found[-1].append(run)
-        groups.append(found)
-    counts = {len(found) for found in groups}
+                clusters.append([])
+            clusters[-1].append(run)
+        groups.append(clusters)
+    counts = {len(clusters) for clusters in groups}
     if counts == {1}:
         return list(runs)
     if len(counts) == 1:
         return max(([run for group in rank for run in group] for rank in zip(*groups, strict=True)), key=len)
-    return max((group for found in groups for group in found), key=len)
+    return max((group for clusters in groups for group in clusters), key=len)
 
 
 def without_short(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
-    """Leave out the runs that are too short to be diagnosed, with a remark, where others remain.
+    """Leave out the runs that are too short to be diagnosed, with a remark, if other runs remain.
 
     A driven run needs `LEAST_SAMPLES` samples to separate noise from response. A free decay with fewer samples is
     left out where it shows no motion that can be diagnosed.
@@ -231,12 +232,12 @@ _NOT_DIAGNOSABLE = (Status.NO_OSCILLATION, Status.NOT_DETERMINED)
 
 
 def _motion(run: Run, campaign: Campaign) -> Status:
-    """The outcome of a fit of one free decay to a run."""
+    """The result of the fit of one free decay to a run."""
     return identify_run(run, campaign.sensor, cycles_per_window=NO_WINDOWS).estimate.status
 
 
 def refuse_undiagnosable(campaign: Campaign, given: NominalModel | None = None) -> None:
-    """Refuse driven runs that the diagnosis does not treat yet, and runs that the nominal model cannot describe.
+    """Refuse driven runs that the diagnosis cannot treat, and runs that the nominal model cannot describe.
 
     Args:
         given: your own nominal model; None: the model of the campaign's kind.
@@ -272,8 +273,8 @@ def refuse_motionless(campaign: Campaign, model: NominalModel) -> None:
     """Refuse a run that shows no motion to diagnose; the estimators leave out the same free decays.
 
     Raises:
-        TunnelError: for the first run without a decaying motion, or the first driven one that does not
-            follow from its input, as an oscillation where there is a spring.
+        TunnelError: for the first run without a decaying motion, or the first driven run with a motion that
+            does not follow from its input, as an oscillation if there is a spring.
     """
     for run in campaign.decays:
         status = _motion(run, campaign)
@@ -300,10 +301,10 @@ def refuse_motionless(campaign: Campaign, model: NominalModel) -> None:
 def kinds_for(
     campaign: Campaign, kinds: Sequence[type[Effect]], model: NominalModel
 ) -> tuple[tuple[type[Effect], ...], tuple[str, ...]]:
-    """The effects to answer with that can be fitted to a campaign, and sentences that name the others.
+    """The effects to answer with that can be fitted to a campaign, and sentences that name the other effects.
 
-    Without driven runs, effects of driven runs are omitted without a sentence. Where no run has a moment as its
-    input, effects of a moment are omitted without one too.
+    Effects of driven runs are omitted without a sentence if no run is driven, and effects of a moment if no run
+    has a moment as its input.
     """
     if not campaign.driven:
         return tuple(kind for kind in kinds if not kind.driven), ()
@@ -318,7 +319,7 @@ def kinds_for(
 
 
 def gain_words(campaign: Campaign, fit: Fit) -> tuple[str, ...]:
-    """The gain of the input by the model or the fit, in a sentence; none where the campaign states it."""
+    """The gain of the input by the model or the fit, in a sentence; none if the campaign states it."""
     data = fit.problem.data
     if said := data.model.gain_words():
         return (said,)

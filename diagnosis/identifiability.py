@@ -1,4 +1,4 @@
-"""Whether a well-designed campaign could show an effect, and distinguish it from every other."""
+"""Whether a well-designed campaign could show an effect, and distinguish it from every other effect."""
 
 from __future__ import annotations
 
@@ -35,9 +35,10 @@ class Identifiability:
     """Visibility of an effect beside the nominal model and the other effects.
 
     Args:
-        share: of the effect's change of the readings that the nominal model cannot absorb, a ratio of norms.
+        share: share of the effect's change of the readings that the nominal model cannot absorb, a ratio of
+            norms.
         cosines: absolute cosine between this change and the change by another effect, by name, greatest first.
-        driven: whether the runs were driven, as an effect of the input needs.
+        driven: whether the runs were driven, because the effect acts on the input.
     """
 
     LAW: ClassVar[str] = (
@@ -95,7 +96,7 @@ def _nominal(*, driven: bool) -> Fit:
 
     A driven campaign has a moment beside the release: a chirp from 1 to 5 Hz, over all resonances.
     """
-    from tunnel_sim.engine.effect_laws import record  # only here: loads MuJoCo
+    from tunnel_sim.engine.effect_laws import record  # imported here because it loads MuJoCo
     from tunnel_sim.engine.virtual_campaign import run_settings, simulate_campaign, stated_run
 
     conditions = tuple(

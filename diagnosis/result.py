@@ -34,7 +34,7 @@ class Diagnosis(Findings):
     """The answer for people: as text, figures, a page and tables."""
 
     def in_words(self) -> Diagnosis:
-        """The answer with its text fields, and the remarks on the noise after the examination's."""
+        """The answer with its text fields; remarks on the noise follow the examination's remarks."""
         found, model, unit = self.found, self.model, self.misfit.unit
         rest = self.rest and replace(self.rest, words=self.rest.in_words(self))
         place = where_words(self.where, found.place or found.nowhere, self)
@@ -85,15 +85,16 @@ class Diagnosis(Findings):
         Raises:
             TunnelError: for a figure or a run that this diagnosis does not have.
         """
-        from tunnel_lab.report import draw  # the one upward import (decision 0001); matplotlib is slow
+        # the one upward import (decision 0001), here because matplotlib is slow to load
+        from tunnel_lab.report import draw
 
         return draw(self, what, runs)
 
     def write_report(self, path: Path | str, *, author: str = "", notes: str = "") -> Path:
-        """Write the report, one HTML page, which replaces an older one.
+        """Write the report, one HTML page; it replaces an older page.
 
         Args:
-            author: who made the diagnosis.
+            author: author of the diagnosis.
             notes: for the head of the page.
 
         Raises:
@@ -148,7 +149,7 @@ class Diagnosis(Findings):
         return correlated(values, correlation * np.outer(std, std))
 
     def candidates_frame(self) -> pl.DataFrame:
-        """A row for each answer weighed: effect, probability, excess_after and closed, as in `Candidate`."""
+        """A row for each weighed answer: effect, probability, excess_after and closed, as in `Candidate`."""
         kinds = {"effect": pl.String, **dict.fromkeys(("probability", "excess_after", "closed"), pl.Float64)}
         rows = [{name: getattr(candidate, name) for name in kinds} for candidate in self.candidates]
         return pl.DataFrame(rows, schema=kinds)

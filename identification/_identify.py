@@ -49,8 +49,8 @@ def identify(
             of a data logger.
         estimator: a name of `identification.estimators.known_estimators`, or an estimator with its own
             settings, such as ``OutputError(cycles_per_window=5)``, or your own estimator.
-        leave_out: ids of runs to leave out, which a remark names.
-        throw: raise when there is no result at all; otherwise the estimate's status says so.
+        leave_out: ids of runs to leave out; a remark names them.
+        throw: raise an error when no run has a result; otherwise the estimate's status says so.
         progress: called with the numbers of identified runs and of all runs; None: nothing is reported.
 
     Returns:
@@ -87,7 +87,7 @@ def _identified(
     refuse_other_gains(campaign.checked_inputs())
     examined = examine(campaign).accepted()
     remaining = examined.campaign
-    # The rate of a decay is not to be had from these, and the filter does not need one.
+    # the filter does not need the decay rate, which these runs cannot give
     random = (
         () if chosen.name == "filter_error" else tuple(run.id for run in remaining.runs if is_ambient(run))
     )
@@ -100,7 +100,8 @@ def _identified(
     found = widened_by_rounding(found, remaining.runs)
     found = withheld(widened_by_contradictions(found, remaining, examined.remarks), examined.remarks)
     estimate = as_angles(found, campaign.sensor)
-    if examined.remarks or random:  # the estimate includes them, and every run of the campaign, in its order
+    # the estimate includes these runs and every other run of the campaign, in its order
+    if examined.remarks or random:
         of_runs = {run.id: run for run in estimate.runs}
         cycling = {name for one in examined.remarks if in_limit_cycle(one.figures) for name in one.runs}
         why = {run.id: Status.REPEATED_RUN for run in campaign.runs if run.id not in of_runs}
@@ -113,7 +114,8 @@ def _identified(
             statuses=by_severity({*estimate.statuses, *why.values()}),
             remarks=(*examined.remarks, *estimate.remarks),
         )
-    contradicted = any("inertias_kg_m2" in one.figures for one in examined.remarks)  # it names the springs
+    # the remark names the springs
+    contradicted = any("inertias_kg_m2" in one.figures for one in examined.remarks)
     if not contradicted and (pair := pair_remark(remaining, estimate.runs)) is not None:
         estimate = replace(estimate, remarks=(*estimate.remarks, pair))
     estimate = replace(
@@ -128,7 +130,7 @@ def _identified(
 
 
 def _assumed(campaign: Campaign) -> tuple[Remark, ...]:
-    """The remark on driven runs whose input is assumed linear between samples, as it is not stated."""
+    """The remark on driven runs with an unstated hold, for which the input is assumed linear between samples."""
     runs = [run for run in campaign.runs if run.drive is not None and run.drive.hold is None]
     if not runs:
         return ()

@@ -1,4 +1,4 @@
-"""`check_estimator`: whether your own estimator keeps the rules on which identify, scores and sweeps rely.
+"""`check_estimator`: whether your own estimator follows the rules on which identify, scores and sweeps rely.
 
 The campaigns are of the nominal model in closed form, with white noise. The accuracy of the values is not judged
 here: ``tunnel score`` measures it. Wrong units and far too small deviations are found.
@@ -35,17 +35,20 @@ _CONDITIONS = tuple(
     (spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 12.0, 24.0)
 )  # N m/rad, m/s
 _FAR = (
-    0.2  # of the truth: a wrong unit (a factor of 2π, 57, 60 or 100) is further off, a crude method is nearer
+    # share of the truth: a wrong unit (a factor of 2π, 57, 60 or 100) is further off, a crude method is
+    # nearer
+    0.2
 )
-_DEVIATIONS = 6.0  # standard deviations that a value may be off in addition
-_FALSE_ALARMS = 1e-4  # for a right estimator, over all tests of its deviations together
-_REPEATS = 10  # campaigns with different noise
-_SAME = 1.0  # standard deviations between answers to the same runs in another order, or with the other sign
+_DEVIATIONS = 6.0  # standard deviations by which a value may be off in addition
+_FALSE_ALARMS = 1e-4  # false-alarm rate for a right estimator, over all tests of its deviations together
+_REPEATS = 10  # number of campaigns with different noise
+# maximum difference, in standard deviations, between answers for reordered runs, or with the sign inverted
+_SAME = 1.0
 
 
 @dataclass(frozen=True)
 class _Subject:
-    """The estimator under test, with comparisons of its answer with the rules."""
+    """The estimator under test, with checks of its answers against the rules."""
 
     estimator: Estimator
 
@@ -53,14 +56,14 @@ class _Subject:
         return TunnelError(what, where=f"estimator {self.estimator.name}", remedy=remedy)
 
     def estimate(self, campaign: Campaign, of: str) -> Estimate:
-        """Its estimate, after checking the rules of every answer.
+        """The estimator's answer, after checking the rules for every answer.
 
         Args:
             of: the kind of campaign, for messages.
         """
         before = [(run.record.time_s.copy(), run.record.yaw_rad.copy()) for run in campaign.runs]
         try:
-            found = self.estimator.estimate(campaign)
+            estimate = self.estimator.estimate(campaign)
         except (Exception, SystemExit) as error:
             what = f"raises an exception with {of}: {raised_line(error)}"
             remedy = "return an Estimate whose statuses say what failed"
@@ -75,19 +78,19 @@ class _Subject:
             same = np.array_equal(time, run.record.time_s) and np.array_equal(yaw, run.record.yaw_rad)
             if not same:
                 raise self.refuse(f"changes the record of run {run.id}", "copy an array before you change it")
-        self._check_form(found, campaign, of)
-        return found
+        self._check_form(estimate, campaign, of)
+        return estimate
 
     def _check_form(self, answer: object, campaign: Campaign, of: str) -> None:
-        found = checked_return(answer, self.estimator.name, campaign, of)
-        if (found.estimator, found.campaign) != (self.estimator.name, campaign.name):
-            what = f"labels its estimate {found.estimator!r} of {found.campaign!r}"
+        estimate = checked_return(answer, self.estimator.name, campaign, of)
+        if (estimate.estimator, estimate.campaign) != (self.estimator.name, campaign.name):
+            what = f"labels its estimate {estimate.estimator!r} of {estimate.campaign!r}"
             raise self.refuse(what, "write Estimate(campaign.name, self.name, runs, …)")
-        self._check_deviations(found, CAMPAIGN_UNITS, f"with {of}")
-        for run in found.runs:
+        self._check_deviations(estimate, CAMPAIGN_UNITS, f"with {of}")
+        for run in estimate.runs:
             self._check_deviations(run, RUN_UNITS, f"of run {run.id} with {of}")
             self._check_statuses(run, f"run {run.id} with {of}")
-        self._check_statuses(found, f"the campaign with {of}")
+        self._check_statuses(estimate, f"the campaign with {of}")
 
     def _check_deviations(self, owner: object, names: Iterable[str], of: str) -> None:
         for name in names:
@@ -120,12 +123,12 @@ def check_estimator(estimator: str | Estimator | type[Any], *, free_decays: bool
     runs, in another order and with the other sign; its failures must be statuses; and it must not change its input.
 
     Args:
-        estimator: its name, an object, or a class that needs no arguments.
-        free_decays: False where it takes driven runs only.
+        estimator: name, object, or class that needs no arguments.
+        free_decays: False if the estimator takes driven runs only.
 
     Raises:
-        TunnelError: for the first broken rule; the text says what to do. The traceback of an exception of the
-            estimator is a note of the error.
+        TunnelError: for the first broken rule; the text says what to do. If the estimator raised an exception,
+            its traceback is a note of the error.
     """
     subject = _Subject(_made(estimator))
     driven = takes_driven(subject.estimator)
@@ -162,19 +165,19 @@ def _made(estimator: object) -> Estimator:
 
 
 def _check_values(subject: _Subject) -> None:
-    """Units and deviations: values near the truth, and equal ones for the same runs."""
+    """Units and deviations: values are near the truth, and equal for the same runs."""
     campaign = _campaign()
-    found = subject.estimate(campaign, "noisy runs")
+    estimate = subject.estimate(campaign, "noisy runs")
     truths = _truths()
-    if not any(run.identified for run in found.runs):
-        what = f"identifies none of six clean decays: {found.runs[0].status.name}"
+    if not any(run.identified for run in estimate.runs):
+        what = f"identifies none of six clean decays: {estimate.runs[0].status.name}"
         raise subject.refuse(what, "try it on tunnel score, and read its statuses")
-    for run, truth in zip(found.runs, truths, strict=True):
+    for run, truth in zip(estimate.runs, truths, strict=True):
         for name, true in truth.items():
             _compare(subject, f"{name} of run {run.id}", getattr(run, name), true)
     for name, true in TRUTH.items():
-        _compare(subject, name, getattr(found, name), true)
-    if subject.estimate(_campaign(), "noisy runs") != found:
+        _compare(subject, name, getattr(estimate, name), true)
+    if subject.estimate(_campaign(), "noisy runs") != estimate:
         what = "gives a different answer for the same runs"
         raise subject.refuse(what, "make the generator in estimate: numpy.random.default_rng(self.seed)")
 
@@ -192,19 +195,21 @@ def _compare(subject: _Subject, name: str, quantity: Quantity | None, truth: flo
 def _check_same_runs(subject: _Subject) -> None:
     """The order of the runs, the sign and the zero of the sensor do not matter."""
     campaign = _campaign()
-    found = subject.estimate(campaign, "noisy runs")
+    estimate = subject.estimate(campaign, "noisy runs")
     turned = subject.estimate(replace(campaign, runs=campaign.runs[::-1]), "runs in reverse order")
     mirrored = subject.estimate(_changed(campaign, lambda _, yaw: 0.1 - yaw), "the other sign and zero")
     for other, runs, how in (
         (turned, turned.runs[::-1], "in another order"),
         (mirrored, mirrored.runs, "of the other sign and zero"),
     ):
-        pairs = [(name, getattr(found, name), getattr(other, name)) for name in PARAMETERS]
-        for run, same in zip(found.runs, runs, strict=True):
+        pairs = [(name, getattr(estimate, name), getattr(other, name)) for name in PARAMETERS]
+        for run, same in zip(estimate.runs, runs, strict=True):
             pairs += [(f"{name} of run {run.id}", getattr(run, name), getattr(same, name)) for name in _RATES]
-        for name, one, two in pairs:
-            if (one is None) != (two is None) or (one and abs(one.value - two.value) > _SAME * one.std):
-                values = f"{getattr(one, 'value', None)} and {getattr(two, 'value', None)}"
+        for name, first, second in pairs:
+            if (first is None) != (second is None) or (
+                first and abs(first.value - second.value) > _SAME * first.std
+            ):
+                values = f"{getattr(first, 'value', None)} and {getattr(second, 'value', None)}"
                 what = f"{name} is not the same for the same runs {how}: {values}"
                 raise subject.refuse(what, "fit the zero, and use no run as the first")
 
@@ -216,20 +221,21 @@ def _check_deviations(subject: _Subject) -> None:
     """Values do not scatter by more than the stated deviations, beyond chance."""
     from scipy.stats import chi2
 
-    found = [subject.estimate(_campaign(seed=seed), "noisy runs") for seed in range(1, _REPEATS + 1)]
-    several = {name: [getattr(one, name) for one in found] for name in PARAMETERS}
-    for place, run in enumerate(found[0].runs):
+    estimates = [subject.estimate(_campaign(seed=seed), "noisy runs") for seed in range(1, _REPEATS + 1)]
+    several = {name: [getattr(estimate, name) for estimate in estimates] for name in PARAMETERS}
+    for place, run in enumerate(estimates[0].runs):
         several |= {
-            f"{name} of run {run.id}": [getattr(one.runs[place], name) for one in found] for name in _RATES
+            f"{name} of run {run.id}": [getattr(estimate.runs[place], name) for estimate in estimates]
+            for name in _RATES
         }
-    known = {name: [one for one in some if one is not None] for name, some in several.items()}
+    known = {name: [quantity for quantity in some if quantity is not None] for name, some in several.items()}
     tested = {name: some for name, some in known.items() if len(some) == _REPEATS}
     if not tested:
         return
     most = chi2.isf(_FALSE_ALARMS / len(tested), _REPEATS - 1) / (_REPEATS - 1)
     for name, some in tested.items():
-        spread = float(np.std([one.value for one in some], ddof=1))
-        stated = float(np.sqrt(np.mean([one.std**2 for one in some])))
+        spread = float(np.std([quantity.value for quantity in some], ddof=1))
+        stated = float(np.sqrt(np.mean([quantity.std**2 for quantity in some])))
         if spread**2 > most * stated**2:
             what = (
                 f"{name} scatters by {spread:.2g} {some[0].unit} with the noise, and {stated:.2g} is stated"
@@ -243,7 +249,7 @@ def _check_partial(subject: _Subject) -> None:
     still = replace(whole, runs=whole.in_still_air)
     unstated = replace(whole, runs=tuple(replace(run, spring_stiffness=None) for run in whole.runs))
     no_size = replace(whole, rig=RigProperties())
-    one = replace(whole, runs=whole.runs[:1])
+    single = replace(whole, runs=whole.runs[:1])
     rng = np.random.default_rng(3)
     holes = replace(
         whole,
@@ -253,12 +259,12 @@ def _check_partial(subject: _Subject) -> None:
         (still, "wind-off runs only", ("cn_beta", "cn_r")),
         (unstated, "runs without a stated spring", PARAMETERS),
         (no_size, "a rig without sizes", ("cn_beta", "cn_r")),
-        (one, "one run", ("cn_beta", "cn_r")),
+        (single, "one run", ("cn_beta", "cn_r")),
         (holes, "samples that are missing", ()),
     ):
-        found = subject.estimate(campaign, of)
+        estimate = subject.estimate(campaign, of)
         for name in absent:
-            if getattr(found, name) is not None:
+            if getattr(estimate, name) is not None:
                 what = f"gives {name} with {of}, which do not determine it"
                 raise subject.refuse(what, "give None, and a status such as Status.NO_WIND_ON")
 

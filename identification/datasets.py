@@ -24,7 +24,8 @@ MEASURED_CAMPAIGNS: tuple[str, ...] = (
 )
 """Names of the packaged measured campaigns."""
 
-# Windows of Table III with two possible readings of omega_n in the scan, and the reading that is not in the file.
+# Windows of Table III with two possible readings of omega_n in the scan, and the reading that is not in the
+# file.
 _SECOND_READING = {3: 12.5054, 4: 12.5638}
 
 
@@ -44,13 +45,13 @@ class SpringRow:
 
 @dataclass(frozen=True)
 class WindowRow:
-    """Three consecutive cycles of Table III's wind-on run.
+    """Three consecutive cycles of the wind-on run in Table III.
 
     Args:
         number: of the window, counted from the release.
         zeta: damping ratio.
         omega_n_rad_per_s: natural frequency, rad/s.
-        omega_n_second_reading_rad_per_s: where the scan is garbled, its other possible reading; else None.
+        omega_n_second_reading_rad_per_s: the other possible reading, rad/s, if the scan is unclear; else None.
     """
 
     number: int

@@ -57,9 +57,9 @@ class NoiseLevel:
         std: standard deviation used, rad, quantisation included.
         source: ``stated`` (noise_std and resolution of the campaign) or ``residual`` (of the fit).
         residual_std: standard deviation of the residual, rad.
-        slow_ratio: factor on the variances: 1 in white noise; in coloured noise its power at the frequency of the
-            motion over the power of white noise of ``std``; where the model departs, the power of the residual's
-            slow part over the power of white noise.
+        slow_ratio: factor on the variances. In white noise it is 1. In coloured noise it is the noise power at
+            the frequency of the motion over the power of white noise of ``std``. Where the model departs, it is
+            the power of the residual's slow part over the power of white noise.
         departs: whether the residual has more power than white or coloured noise beyond chance (false-alarm rate
             1e-3).
         disagrees: whether the residual's white part contradicts the stated noise.
@@ -82,7 +82,7 @@ class WindowEstimate:
     Args:
         start_s: start of the window since the record's first sample, s.
         duration_s: length of the window, s.
-        amplitude: of the oscillation at mid-window, rad.
+        amplitude: amplitude of the oscillation at mid-window, rad.
         omega_n: natural angular frequency, rad/s.
         zeta: damping ratio.
         cycles: number of periods; three, or one in a short record.
@@ -115,18 +115,18 @@ class RunEstimate:
     """The result for one run.
 
     Args:
-        id: the run's.
-        statuses: from the gravest; only OK where there are no others.
+        id: id of the run.
+        statuses: from the gravest to the least; OK alone if there are no others.
         omega_n: natural angular frequency, rad/s; None for a body without a spring.
         zeta: damping ratio; None for a body without a spring.
         initial_angle: at the first sample, from the sensor's zero, rad; without a spring as the sensor reads it.
         initial_rate: at the first sample, rad/s.
-        sensor_zero: from this run alone, rad; None for a body without a spring.
+        sensor_zero: zero of the sensor from this run alone, rad; None for a body without a spring.
         aerodynamic_stiffness: Ka, N m/rad, from the whole campaign; wind-on runs only.
         aerodynamic_damping: Ca, N m s/rad, from the whole campaign; wind-on runs only.
-        process_noise: spectral intensity of a random moment over the inertia, rad²/s³; None where the method
-            does not estimate it, or the run shows none.
-        noise: the noise level behind the standard deviations; None where the method does not use it.
+        process_noise: spectral intensity of a random moment over the inertia, rad²/s³; None if the method does
+            not estimate it, or the run shows none.
+        noise: the noise level behind the standard deviations; None if the method does not use one.
         windows: consecutive windows of three cycles.
     """
 
@@ -156,7 +156,7 @@ class RunEstimate:
         return self.omega_n is not None or self.initial_angle is not None
 
     def to_json_dict(self) -> dict[str, Any]:
-        """Fields by name; None where there is no value."""
+        """Fields by name; a missing value is None."""
         return {"id": self.id, **_statuses_json(self.statuses), **_fields_json(self, "statuses")}
 
 
@@ -169,10 +169,11 @@ class RunScatter:
         damping: standard deviation of the decay rate, a fraction of it; root mean square over the runs.
         wind_speed: standard deviation of the runs' own speeds, a fraction; None where it does not count.
         spring_stiffness: standard deviation of the runs' own springs, a fraction; None where it does not count.
-        mechanical_damping: standard deviation of their own damping, a fraction; None where it does not count.
+        mechanical_damping: standard deviation of the runs' own damping, a fraction; None where it does not
+            count.
         stated: names of the sizes among these three that the campaign states; the others are estimated.
-        covariances: contribution of each of the three that is not None to the covariance of the parameters, in the
-            products of their units; shape (k, p, p).
+        covariances: contribution to the covariance of the parameters by each of the three that is not None, in
+            the products of their units; shape (k, p, p).
     """
 
     __pydantic_config__ = _FINITE
@@ -187,14 +188,14 @@ class RunScatter:
 
     @property
     def widths(self) -> dict[str, Quantity]:
-        """The deviations that count, by name."""
+        """The standard deviations that count, by name."""
         every = {
             name: getattr(self, name) for name in ("wind_speed", "spring_stiffness", "mechanical_damping")
         }
         return {name: width for name, width in every.items() if width is not None}
 
     def among(self, kept: Sequence[int]) -> RunScatter:
-        """The scatter for some of the parameters, by their indices."""
+        """The scatter for some of the parameters, given by their indices."""
         chosen = [tuple(tuple(rows[i][j] for j in kept) for i in kept) for rows in self.covariances]
         return replace(self, covariances=tuple(chosen))
 
@@ -209,22 +210,22 @@ class Estimate:
     Args:
         campaign: the campaign's name.
         estimator: the method's name in the registry.
-        runs: one per run of the campaign, in its order.
-        statuses: from the gravest; only OK where there are no others.
+        runs: one estimate per run of the campaign, in its order.
+        statuses: from the gravest to the least; OK alone if there are no others.
         cn_beta: Cnβ, 1/rad.
         cn_r: Cnr, 1/rad.
         yaw_inertia: Izz, kg m², from the method's own model.
         mechanical_damping: Cr, N m s/rad.
-        sensor_zero: common to the campaign, rad.
+        sensor_zero: zero of the sensor, common to the campaign, rad.
         wind_off_inertia: Izz as the gradient of Kr against ωn² of the wind-off runs, kg m².
         wind_off_intercept: the intercept of that line, N m/rad; None with one spring.
         parameters: names of the covariance's rows and columns.
-        covariance: of the parameters, in the products of their units; shape (p, p).
+        covariance: covariance of the parameters, in the products of their units; shape (p, p).
         noise: the noise level behind the covariance; None where the method does not use it.
-        remarks: of the examination before the estimation, on runs left out, cut or worth a look.
-        repeatability: the scatter between runs, which the covariance includes; None where none is stated and the
-            runs show none beyond their noise.
-        trade_off: the two coefficients that the runs separate least; None where they separate all of them.
+        remarks: remarks of the examination before the estimation, on runs left out, cut, or to be checked.
+        repeatability: the scatter between runs, included in the covariance; None if none is stated and the runs
+            show none beyond their noise.
+        trade_off: the two most strongly correlated coefficients; None if the runs separate all of them.
         motion: ``displacement`` of a linear freedom: m, N and kg then replace rad, N m and kg m², and
             ``yaw_inertia`` is the mass; the JSON of an angle does not have it.
     """
@@ -266,7 +267,7 @@ class Estimate:
         return as_text(estimate_blocks(self.to_json_dict()))
 
     def __repr__(self) -> str:
-        """The coefficients, the number of runs, and where to go from here, in three lines."""
+        """The coefficients, the number of runs, and what to call next, in three lines."""
         return estimate_brief(self.to_json_dict())
 
     def _repr_html_(self) -> str:
@@ -289,7 +290,7 @@ class Estimate:
         return pl.DataFrame(rows, schema={"quantity": pl.String, **numbers, "unit": pl.String, **ends})
 
     def to_frame(self) -> pl.DataFrame:
-        """`coefficients_frame`, or `runs_frame` where the runs give no coefficients."""
+        """`coefficients_frame`, or `runs_frame` if the runs give no coefficients."""
         known = any(getattr(self, name) is not None for name in _CAMPAIGN_QUANTITIES)
         return self.coefficients_frame() if known else self.runs_frame()
 
@@ -301,7 +302,7 @@ class Estimate:
         """The coefficients of ``parameters`` by name for the package uncertainties, with their covariance.
 
         Raises:
-            TunnelError: where uncertainties, of the extra ``frames``, is not installed.
+            TunnelError: when uncertainties, of the extra ``frames``, is not installed.
         """
         values = {name: getattr(self, name) for name in self.parameters}
         return correlated(values, self.covariance_matrix)
@@ -315,10 +316,11 @@ class Estimate:
 
         Returns:
             One chain in the group ``posterior``: the coefficients of ``parameters`` with their covariance, and
-            ``omega_n`` (rad/s) and ``zeta`` (1) of the identified runs over the dimension ``run``, independent.
+                ``omega_n`` (rad/s) and ``zeta`` (1) of the identified runs over the dimension ``run``,
+                independent.
 
         Raises:
-            TunnelError: where arviz-base, a part of ArviZ 1, is not installed.
+            TunnelError: when arviz-base, a part of ArviZ 1, is not installed.
         """
         from_dict = library("arviz_base", "to_arviz", "arviz").from_dict
         std = np.sqrt(np.diag(self.covariance_matrix))
@@ -351,7 +353,7 @@ class Estimate:
         return wide_frame(rows, {"run": pl.String, **times}, ("amplitude", "omega_n", "zeta"))
 
     def to_json_dict(self) -> dict[str, Any]:
-        """Fields by name; None where there is no value."""
+        """Fields by name; a missing value is None."""
         return {
             "campaign": self.campaign,
             "estimator": self.estimator,
@@ -399,7 +401,7 @@ def estimate_schema() -> dict[str, Any]:
 def as_pandas(frame: pl.DataFrame) -> DataFrame:
     """A pandas frame, built by columns: Polars' own conversion needs pyarrow."""
     try:
-        from pandas import DataFrame  # only here: an extra
+        from pandas import DataFrame  # imported here because it is an extra
     except ModuleNotFoundError as error:
         raise TunnelError("pandas is not installed", remedy=f"run {installing('frames')}") from error
     return DataFrame(frame.to_dict(as_series=False))
@@ -424,7 +426,7 @@ def wide_frame(
     """A row for each document: the plain columns, then the value of each quantity, and its ``_std``.
 
     Args:
-        plain: keys whose values are copied unchanged, with their types.
+        plain: keys with values to copy unchanged, and their types.
         quantities: keys of quantities, which have a value and a std, or are None.
     """
     columns: dict[str, list[Any]] = {name: [row[name] for row in rows] for name in plain}

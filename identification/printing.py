@@ -43,7 +43,7 @@ COEFFICIENTS: Mapping[str, str] = {
     "moment_offset": "constant moment",
     "servo_kp": "kp",
 }
-"""Symbols of the coefficients of a diagnosis, also of coefficients multiplied by sizes that are not stated."""
+"""Symbols of the coefficients of a diagnosis, also of coefficients multiplied by unstated sizes."""
 
 
 def coefficient_label(name: str, unit: str) -> str:
@@ -55,7 +55,7 @@ Document = Mapping[str, Any]
 
 
 SHOWN_RUNS = 16
-"""At most this many runs are listed."""
+"""Maximum number of runs listed."""
 
 
 def estimate_blocks(
@@ -64,8 +64,9 @@ def estimate_blocks(
     """An estimate: the coefficients, the runs, the scatter between them, and a paragraph for each note.
 
     Args:
-        conditions: of the runs, which are then all listed; without them, the first `SHOWN_RUNS` runs.
-        windows: whether a table for each run has its windows.
+        conditions: conditions of the runs, which are then all listed; without them, the first `SHOWN_RUNS` runs
+            are.
+        windows: whether to add a table of windows for each run.
     """
     count = len(document["runs"]) - SHOWN_RUNS
     more = (
@@ -89,14 +90,14 @@ def freedom_of(document: Document) -> Freedom:
 
 
 def names_in(document: Document) -> tuple[str, ...]:
-    """Names of the user's in an estimate."""
+    """The names in an estimate that the user chose: of the campaign and of the runs."""
     return document["campaign"], *(run["id"] for run in document["runs"])
 
 
 def notes(document: Document) -> list[str]:
     """The scatter between runs, what trades off, and the remarks and statuses with their remedies."""
     from identification.trade_off import (
-        TradeOff,  # loads numpy, for which the help of the command cannot wait
+        TradeOff,  # numpy is slow to load, and the help of the command must not wait for it
     )
 
     remarks = [str(Remark.from_json_dict(remark)) for remark in document["remarks"]]
@@ -114,14 +115,14 @@ BRACKETS = (
     "In brackets: the standard deviation in the last digits; 12.53(10) is 12.53 ± 0.10. It includes the noise "
     "only; tunnel diagnose adds the error of the model."
 )
-"""Stands below tables in the short notation."""
+"""Note below tables in the short notation."""
 
 
 def trade_off_line(found: TradeOff | None, symbols: Mapping[str, str]) -> str:
-    """The two parameters that the runs separate least, and the run that would; empty if there are none.
+    """The two most strongly correlated parameters, and the run that would separate them; empty if there are none.
 
     Args:
-        symbols: of the parameters, by name, where they have one.
+        symbols: symbols of the parameters by name, for parameters that have one.
     """
     if found is None:
         return ""
@@ -151,7 +152,7 @@ def _together(given: Combination | None, second: str, symbols: Mapping[str, str]
 
 
 def _correlation(value: float) -> str:
-    """A correlation with as many decimals as show that it is not 1, six at most."""
+    """A correlation with as many decimals as needed to differ from 1, six at most."""
     apart = max(1.0 - abs(value), 10.0**-_MOST_DECIMALS)
     decimals = min(max(2, math.ceil(-math.log10(apart))), _MOST_DECIMALS)
     return f"{'−' if value < 0.0 else ''}{abs(value):.{decimals}f}"
@@ -161,7 +162,7 @@ _MOST_DECIMALS = 6
 
 
 def _parameter_label(name: str, symbols: Mapping[str, str]) -> str:
-    """A parameter in a sentence: its symbol, or its effect with its name."""
+    """A parameter in a sentence: its symbol, or its name with its effect's."""
     effect, _, own = name.rpartition(".")
     words = own.replace("_", " ")
     return f"{effect.replace('_', ' ')} ({words})" if effect else symbols.get(name, words)
@@ -178,7 +179,7 @@ DEVIATIONS: Mapping[str, str] = {
 def repeatability_lines(document: Document) -> list[str]:
     """The repeatability of the runs of an estimate: nothing where they show no scatter beyond their noise.
 
-    If there are only as many runs as the coefficients need, the lines state that the scatter is unknown.
+    If there are only as many runs as coefficients, the lines state that the scatter is unknown.
     """
     if "repeatability" not in document:  # from an earlier version
         return []
@@ -225,7 +226,7 @@ def percent(share: float) -> str:
 
 
 def estimate_brief(document: Document) -> str:
-    """An estimate in three lines: its coefficients, its runs, and where to go from here."""
+    """An estimate in three lines: its coefficients, its runs, and what to call next."""
     names = {**SYMBOLS, "omega_n": "ωn", "zeta": "ζ"}
     run: Document = document["runs"][0] if document["runs"] else {}
     whole = [(name, document[name]) for name in SYMBOLS if document[name] is not None]
@@ -243,7 +244,7 @@ def estimate_brief(document: Document) -> str:
 
 
 def coefficients_table(document: Document) -> TextTable:
-    """The coefficients of the campaign that could be identified; no rows where there are none."""
+    """The identified coefficients of the campaign; no rows if there are none."""
     names = {**SYMBOLS, "wind_off_inertia": "Izz, gradient of Kr over ωn²"}
     rows = tuple(
         (f"{symbol} {unit(document[name]['unit'])}", quantity_text(document[name]))
@@ -255,7 +256,7 @@ def coefficients_table(document: Document) -> TextTable:
 
 
 def runs_table(document: Document, conditions: Conditions | None = None) -> TextTable:
-    """Natural frequency and damping ratio of the runs: of all, with their conditions, or of `SHOWN_RUNS`."""
+    """Natural frequency and damping ratio of all runs with their conditions, or of `SHOWN_RUNS` runs."""
     runs = document["runs"][: None if conditions else SHOWN_RUNS]
     stated = ("Kr\n[N m/rad]", *["V\n[m/s]"] * freedom_of(document).windy) if conditions else ()
     rows = tuple(

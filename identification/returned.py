@@ -45,20 +45,20 @@ class WrongReturn(TunnelError):
 Fault = tuple[str, str]
 """The fault, and the remedy."""
 _SAME_STD = 1e-3  # relative: a standard deviation may be rounded to three digits or more
-_ROUNDING = 1e-6  # of a correlation: a covariance is a product of matrices
+_ROUNDING = 1e-6  # tolerance of a correlation: a covariance is a product of matrices
 
 
 def checked_return(found: object, name: str, campaign: Campaign, of: str = "") -> Estimate:
-    """The returned value of an estimator for a campaign, checked.
+    """The value that an estimator returned for a campaign, checked.
 
     Args:
         name: of the estimator.
         of: words for the campaign in messages; empty: its name.
 
     Raises:
-        WrongReturn: when it is not an estimate; its runs are not the campaign's in their order; a value
-            is not a finite number, has another unit, or lacks its standard deviation; the covariance does not fit
-            the coefficients; or it cannot be written as JSON.
+        WrongReturn: when it is not an estimate; its runs are not the campaign's in their order; a value is not
+            a finite number, has another unit, or lacks its standard deviation; the covariance does not fit the
+            coefficients; or it cannot be written as JSON.
     """
     more = "" if of else "; identification.check_estimator checks a class"
     of = of or f"campaign '{campaign.name}'"
@@ -73,7 +73,7 @@ def checked_return(found: object, name: str, campaign: Campaign, of: str = "") -
 
 
 def _fault(estimate: Estimate, campaign: Campaign, of: str) -> Fault | None:
-    """The first fault of an answer; None where there is none."""
+    """The first fault of an answer; None if there is none."""
     if not isinstance(estimate.runs, tuple):
         return f"the runs with {of} are {_described(estimate.runs)}", "give a tuple of RunEstimate"
     given, wanted = [getattr(run, "id", None) for run in estimate.runs], [run.id for run in campaign.runs]
@@ -97,7 +97,7 @@ def _fault(estimate: Estimate, campaign: Campaign, of: str) -> Fault | None:
 
 
 def _fault_of_quantity(name: str, quantity: object, unit: str, of: str) -> Fault | None:
-    """The first fault of a quantity; None where there is none, and where it is None."""
+    """The first fault of a quantity; None without a fault, and for a quantity that is None."""
     if quantity is None:
         return None
     if not isinstance(quantity, Quantity):
@@ -131,12 +131,12 @@ def _is_number(value: object) -> bool:
 
 
 def _described(value: object) -> str:
-    """A wrong value, with its type unless the text shows it."""
+    """A wrong value in words, with its type unless the text shows it."""
     return "None" if value is None else f"{type(value).__name__} {one_line(repr(value), 60)}"
 
 
 def _fault_of_covariance(estimate: Estimate, of: str) -> Fault | None:
-    """The first fault of the covariance of the coefficients; None where there is none."""
+    """The first fault of the covariance of the coefficients; None if there is none."""
     given = tuple(name for name in PARAMETERS if getattr(estimate, name) is not None)
     names, rows = estimate.parameters, estimate.covariance
     if not isinstance(names, tuple) or sorted(map(str, names)) != sorted(given):
@@ -165,7 +165,7 @@ def _fault_of_variances(matrix: Array, stds: Array, names: tuple[str, ...], of: 
 
     Args:
         matrix: the covariance, shape (p, p).
-        stds: of the named values, shape (p,).
+        stds: standard deviations of the named values, shape (p,).
     """
     for name, variance, std in zip(names, matrix.diagonal().tolist(), stds.tolist(), strict=True):
         if variance < 0.0:

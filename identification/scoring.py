@@ -2,8 +2,8 @@
 
 Standard errors of bias and RMSE are the standard errors of means (delta method for the root); see
 `root_mean_square` for few trials. The tests against a baseline use only ranks and counts, so they are exact, or
-nearly so, for any distribution of the errors. If nothing changed, old and new trials are exchangeable, and so is
-any choice made from both together (a direction, a threshold).
+nearly so, for any distribution of the errors. If the method has not changed, old and new trials are
+exchangeable, and so is any choice made from both together (a direction, a threshold).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from identification.statistics import Proportion
 from tunnel_sim.vocabulary.record import Array, read_only
 
 NOMINAL_COVERAGE = 0.95
-_LEAST = 2  # trials needed for a sampling error
+_LEAST = 2  # minimum number of trials for a sampling error
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class ScoredEstimate:
 
     Args:
         truth: true value, in the quantity's unit.
-        bound: smallest standard deviation of any unbiased estimator, in the same unit; None where it is not
+        bound: smallest standard deviation of any unbiased estimator, in the same unit; None if not known.
             known.
     """
 
@@ -46,9 +46,9 @@ class Trials:
 
     Args:
         error: estimate − truth of the identified trials, shape (k,).
-        std: as reported by the method, shape (k,).
+        std: standard deviations reported by the method, shape (k,).
         truth: shape (k,).
-        bound: see `ScoredEstimate`, shape (k,); None where it is not known for all.
+        bound: see `ScoredEstimate`, shape (k,); None if not known for all trials.
         failures: number of further trials that gave no estimate.
         unit: of error, std, truth and bound.
     """
@@ -109,10 +109,10 @@ class Score:
     Args:
         bias: mean error, in the quantity's unit.
         relative_bias: mean of error over the size of the truth, %; None where a truth is zero.
-        bias_in_stds: mean of error over the reported standard deviation; None where one of these is zero.
+        bias_in_stds: mean of error over the reported standard deviation; None if one of these is zero.
         rmse: root of the mean squared error, in the quantity's unit.
         rmse_over_bound: root of the mean squared ratio of error to bound; None where the bound is not known.
-        coverage: of the 95 % intervals, among the trials with an estimate; None where there is none.
+        coverage: coverage of the 95 % intervals, among the trials with an estimate; None without any.
     """
 
     count: int
@@ -163,9 +163,9 @@ def mean_figure(values: Array, unit: str) -> Quantity:
 def root_mean_square(values: Array, unit: str) -> Quantity:
     """√mean(x²) with its standard error, propagated from mean(x²).
 
-    Few squares may be alike by chance, and their scatter is then too small. The standard error is therefore
-    at least the one for normal errors of this mean m and variance s²: the variance of x² is then 2 s⁴ + 4 m² s².
-    For zero mean this is 1/√(2n) of the root.
+    A few squares may be similar by chance, and their scatter is then too small. The standard error is therefore
+    at least its value for normal errors of this mean m and variance s²: the variance of x² is then 2 s⁴ + 4 m²
+    s². For zero mean this is 1/√(2n) of the root.
 
     Args:
         values: shape (n,), n ≥ 2, in the unit.
@@ -183,7 +183,7 @@ def reach_of_rmse(trials: int) -> tuple[float, float]:
     """The ends of the 95 % interval of an RMSE over its estimate, for normal errors without bias (χ²).
 
     Args:
-        trials: number of errors in it, from 1.
+        trials: number of errors, at least 1.
     """
     from scipy.special import chdtri
 
@@ -192,7 +192,7 @@ def reach_of_rmse(trials: int) -> tuple[float, float]:
 
 
 def overall(scores: Iterable[Score]) -> Quantity | None:
-    """The root mean square over cells of their RMSE over the bound, with its standard error.
+    """The root mean square over cells of RMSE over bound, with its standard error.
 
     None where no cell has a bound.
     """
@@ -212,12 +212,12 @@ class Change:
     """One aspect of one method, in the baseline and now.
 
     Args:
-        aspect: ``bias`` and ``spread`` (sizes of errors) in units of the bound, or of the truth where there is no
+        aspect: ``bias`` and ``spread`` (sizes of errors) in units of the bound, or of the truth without a
             bound; ``outliers``, ``coverage`` and ``failures`` as shares.
         before: the baseline's figure, in these units.
         now: the figure now, in these units.
-        p_value: probability of at least this change for the worse if nothing changed; 1 where the figure is
-            no worse.
+        p_value: probability of at least this change for the worse if the method has not changed; 1 if the
+            figure is no worse.
     """
 
     aspect: Aspect

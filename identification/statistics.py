@@ -43,7 +43,7 @@ def inner(left: Array, right: Array) -> Array:
 
 
 def eliminate(information: Square, score: PerUnknown, keep: int) -> tuple[Array, Array]:
-    """The information and score of the first unknowns with the others eliminated (Schur complement)."""
+    """The information and score of the first unknowns, with the others eliminated (Schur complement)."""
     cross = information[keep:, :keep]
     solved = scaled_solve(information[keep:, keep:], np.column_stack((cross, score[keep:])))
     return information[:keep, :keep] - cross.T @ solved[:, :keep], score[:keep] - cross.T @ solved[:, keep]
@@ -75,7 +75,7 @@ def scaled_solve(matrix: Square, right: Array) -> Array:
 
 
 def inverse(information: Square) -> Array:
-    """The inverse of an information matrix that `determined` has passed, symmetric to the last bit.
+    """The inverse of an information matrix that passed `determined`, symmetric to the last bit.
 
     Raises:
         numpy.linalg.LinAlgError: when the matrix is singular.
@@ -99,7 +99,7 @@ def determined(matrix: Square) -> bool:
 
 
 def embed(link: Array, *, with_zero: bool) -> Array:
-    """A run's link extended by the common zero as last parameter, shape (3, p + 1); the link itself without it.
+    """A run's link with the common zero as last parameter, shape (3, p + 1); the link itself without a zero.
 
     Args:
         link: from the shared parameters to (a, k), shape (2, p).
@@ -114,11 +114,11 @@ def embed(link: Array, *, with_zero: bool) -> Array:
 
 
 def weighted_fit(columns: Array, target: Vector, variance: Array) -> tuple[Array, Array]:
-    """Linear least squares with known variances, which are raised where the scatter exceeds them beyond chance.
+    """Linear least squares with known variances, which are raised if the scatter exceeds them beyond chance.
 
     Args:
-        columns: one per unknown, shape (n, p) with n above p.
-        variance: of the target's points, shape (n,).
+        columns: one column per unknown, shape (n, p) with n above p.
+        variance: variance of the target's points, shape (n,).
 
     Returns:
         The unknowns, shape (p,), and their covariance, shape (p, p).
@@ -137,10 +137,10 @@ def decay_covariance(rate: float, omega_d: float, rate_variance: float, omega_va
     """Covariance of (a, k), shape (2, 2), from independent decay rate and damped frequency: k = ωd² + a².
 
     Args:
-        rate: a, 1/s.
+        rate: decay rate a, 1/s.
         omega_d: damped angular frequency, rad/s.
-        rate_variance: of a, (1/s)², square of a standard deviation in 1/s.
-        omega_variance: of ωd, square of a standard deviation in rad/s.
+        rate_variance: variance of a, in (1/s)².
+        omega_variance: variance of ωd, in (rad/s)².
     """
     slope = np.array([[1.0, 0.0], [2.0 * rate, 2.0 * omega_d]])
     return np.asarray(slope @ np.diag([rate_variance, omega_variance]) @ slope.T)
@@ -150,9 +150,9 @@ def deviations(rate: float, omega_d: float, covariance: Array) -> tuple[float, f
     """Standard deviations of decay rate, 1/s, and damped frequency, rad/s: the inverse of `decay_covariance`.
 
     Args:
-        rate: a, 1/s.
+        rate: decay rate a, 1/s.
         omega_d: damped angular frequency, rad/s, above 0.
-        covariance: of (a, k), shape (2, 2), in 1/s and 1/s².
+        covariance: covariance of (a, k), shape (2, 2), in 1/s and 1/s².
     """
     slope = np.array([-rate, 0.5]) / omega_d
     return float(np.sqrt(covariance[0, 0])), float(np.sqrt(slope @ covariance @ slope))
@@ -160,7 +160,7 @@ def deviations(rate: float, omega_d: float, covariance: Array) -> tuple[float, f
 
 @dataclass(frozen=True)
 class Proportion:
-    """A count out of a total, such as the trials that failed.
+    """A count out of a total, such as the number of failed trials.
 
     Args:
         total: the total count; the share is defined above 0 only.
@@ -207,11 +207,11 @@ def fisher_covariance(normal: Square, variance: float) -> Array:
 
 
 def sandwich_covariance(informations: Array, powers: Sequence[float]) -> Array:
-    """Covariance of a least-squares fit to runs whose noise differs, shape (p, p).
+    """Covariance of a least-squares fit to runs with different noise, shape (p, p).
 
     Args:
-        informations: of each run, for noise of variance 1, shape (r, p, p).
-        powers: of the noise of each run at the frequency of its motion.
+        informations: information of each run, for noise of variance 1, shape (r, p, p).
+        powers: power of the noise of each run at the frequency of its motion.
     """
     outer = inverse(np.sum(informations, axis=0))
     middle = sum((one * power for one, power in zip(informations, powers, strict=True)), np.zeros_like(outer))
@@ -235,7 +235,7 @@ def scatter_of_runs(influences: Array, informative_runs: NDArray[np.int64]) -> A
 
 
 def student_factor(relative: Array) -> Array:
-    """Factor on standard deviations whose variances are estimated, so that ±1.96 of them are a 95 % interval.
+    """Factor on standard deviations with estimated variances, for which ±1.96 of them are a 95 % interval.
 
     Args:
         relative: variance of each variance over its square, shape (q,); the degrees of freedom are 2 over it.
@@ -245,13 +245,14 @@ def student_factor(relative: Array) -> Array:
 
 
 def widened_by_contradictions(estimate: Estimate, campaign: Campaign, remarks: Sequence[Remark]) -> Estimate:
-    """Widen the coefficients to their values after correcting contradictory statements.
+    """Widen the coefficients so that they cover their values after contradictory statements are corrected.
 
     The largest change by a correction is the half-width of a rectangular distribution (GUM 4.3.7). The examination
     does not compare damping, so Cr and Cnr are as doubtful, relatively, as the more doubtful of Izz and Cnβ.
 
     Args:
-        remarks: of the examination; remarks on a contradiction contain the possible values of Izz and Ka over ½ρV².
+        remarks: remarks of the examination; for a contradiction they contain the possible values of Izz and Ka
+            over ½ρV².
     """
     inertias = [value for remark in remarks for value in remark.figures.get("inertias_kg_m2", ())]
     moments = [value for remark in remarks for value in remark.figures.get("air_stiffnesses_m3", ()) if value]
@@ -285,11 +286,11 @@ def widened_by_contradictions(estimate: Estimate, campaign: Campaign, remarks: S
     return replace(estimate, runs=tuple(runs), covariance=tuple(map(tuple, covariance.tolist())), **wider)
 
 
-_DENSITY_DECIMALS = 4  # from which a density is a computed value that was rounded, not a nominal one
+_DENSITY_DECIMALS = 4  # decimals from which a density is a rounded result, not a nominal value
 
 
 def density_rounding(runs: Sequence[Run]) -> float:
-    """Relative standard deviation of the stated air densities by their rounding, the largest of the wind-on runs.
+    """Relative standard deviation of the stated air densities due to rounding, the largest of the wind-on runs.
 
     Rounding is a rectangular distribution of half a unit of the last decimal (GUM 4.3.7). A density of fewer than
     four decimals is a nominal value, taken as stated: its uncertainty is the user's to state. A rounded density
@@ -329,7 +330,7 @@ def _wider(found: Quantity, share: float) -> Quantity:
 
 
 def withheld(estimate: Estimate, remarks: Sequence[Remark]) -> Estimate:
-    """Leave out the coefficients where a remark says that a value in a wrong unit makes them wrong by decades.
+    """Leave out the coefficients if a remark says that a value in a wrong unit makes them wrong by decades.
 
     Frequencies and damping ratios of the runs do not depend on the stated values and remain.
     """

@@ -43,8 +43,8 @@ class Status(Enum):
         "a limit cycle, which has no damping ratio: record its growth, or a decay at a lower wind speed"
     )
     AMBIENT_VIBRATION = (
-        "ambient vibration: the motion comes and goes as under a random moment, and a decay fitted to it "
-        "does not have its damping: use -e filter_error"
+        "ambient vibration: the motion comes and goes as under a random moment, and a fitted decay "
+        "does not give its damping: use -e filter_error"
     )
     FREQUENCY_CHANGES = (
         "the frequency changes so much along the decay, as in a pendulum, that no single omega_n and zeta describe "
@@ -100,7 +100,7 @@ _GRAVITY = {status: rank for rank, status in enumerate(Status)}
 
 
 def by_severity(statuses: set[Status]) -> tuple[Status, ...]:
-    """The statuses from the gravest to the least; OK alone where there are none."""
+    """The statuses from the gravest to the least; OK alone if there are none."""
     return tuple(sorted(statuses - {Status.OK}, key=_GRAVITY.__getitem__)) or (Status.OK,)
 
 
@@ -114,10 +114,10 @@ class Outcome(Enum):
 
 
 WITHHOLDS = "withholds_coefficients"
-"""Figure of a remark that withholds the coefficients, true or absent."""
+"""Figure of a remark that withholds the coefficients: true or absent."""
 
 SYSTEMATIC = "systematic"
-"""Figure of a remark on runs that differ, and not by chance: the words for the difference."""
+"""Figure of a remark on runs that differ systematically: the words for the difference."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ class Remark:
     Args:
         outcome: whether the campaign is refused, the runs are left out or cut, or nothing is done.
         runs: ids of the runs concerned.
-        figures: numbers behind it, by name, in JSON's types; units in their names.
+        figures: numbers behind the remark, by name, in JSON's types; units in their names.
     """
 
     outcome: Outcome
@@ -143,11 +143,11 @@ class Remark:
 
     @property
     def withholds(self) -> bool:
-        """Whether the coefficients are not given, since a value in a wrong unit makes them wrong by decades."""
+        """Whether the coefficients are withheld, because a value in a wrong unit makes them wrong by decades."""
         return bool(self.figures.get(WITHHOLDS))
 
     def to_json_dict(self) -> dict[str, Any]:
-        """Fields by name; the figures where there are any."""
+        """Fields by name, with the figures if there are any."""
         said = {"what": self.what, "remedy": self.remedy}
         document = {"outcome": self.outcome.value, "runs": list(self.runs), **said}
         return document | ({"figures": dict(self.figures)} if self.figures else {})
@@ -164,7 +164,7 @@ class Remark:
 
 
 def left_out_as_asked(ids: Collection[str]) -> tuple[Remark, ...]:
-    """The remark on runs that the user left out; none where there are none."""
+    """The remark on runs that the user left out; none if there are none."""
     if not ids:
         return ()
     remedy = f"repeat the run{'s' if len(ids) > 1 else ''}"
@@ -176,7 +176,7 @@ class Examined:
     """A campaign after its examination.
 
     Args:
-        campaign: the runs to identify; the given campaign itself if nothing was left out or cut.
+        campaign: the runs to identify; the given campaign itself if no run was left out or cut.
         remarks: the findings, in the order of the checks.
     """
 
@@ -184,7 +184,7 @@ class Examined:
     remarks: tuple[Remark, ...] = ()
 
     def accepted(self) -> Examined:
-        """Return itself, unless the examination refuses the campaign."""
+        """Return the examined campaign itself, unless the examination refuses it."""
         for remark in self.remarks:
             if remark.outcome is Outcome.REFUSED:
                 word = "run" if len(remark.runs) == 1 else "runs"

@@ -1,4 +1,4 @@
-"""The two parameters that the runs of a campaign separate least, and the run that would separate them.
+"""The two most strongly correlated parameters of a campaign, and the run that would separate them.
 
 Every parameter has a role: the powers with which its moment depends on the conditions of a run. Two parameters are
 separated by a run that changes a condition on which they depend with different powers.
@@ -21,13 +21,13 @@ from tunnel_sim.vocabulary.record import Array
 
 @dataclass(frozen=True)
 class Combination:
-    """The combination of two parameters that the runs determine: the first and a multiple of the second.
+    """A combination of two parameters that the runs determine: the first plus a multiple of the second.
 
     Args:
-        quantity: name of the first, or of the quantity that both add up to.
-        factor: of the second in it, in ``unit`` per unit of the second.
-        value, std: of the combination, in ``unit``.
-        unit: of the combination.
+        quantity: name of the first, or of the quantity to which both add up.
+        factor: factor on the second, in ``unit`` per unit of the second.
+        value, std: value of the combination with its standard deviation, in ``unit``.
+        unit: unit of the combination.
         of_second: interval of 0.95 of the second's contribution within the bounds of both, in ``unit``.
     """
 
@@ -46,11 +46,11 @@ class Combination:
 
         Args:
             values: of both parameters, shape (2,), the first in the unit.
-            covariance: of them, shape (2, 2).
+            covariance: covariance of both, shape (2, 2).
             bounds: least and greatest value of each, shape (2, 2).
 
         Returns:
-            None where the parameters do not add up: where a larger one needs a larger other.
+            None if the parameters do not add up: a larger one then needs a larger other.
         """
         factor = -float(covariance[0, 1] / covariance[1, 1])
         if not factor > 0.0:
@@ -73,9 +73,9 @@ class TradeOff:
 
     Args:
         parameters: names of both, in the order of the fit; for effects ``effect.parameter``.
-        correlation: of their errors, −1 to 1, dimensionless.
+        correlation: correlation of their errors, −1 to 1, dimensionless.
         remedy: the run that would separate them, as a clause in the imperative.
-        together: the combination that the runs determine; None where the two do not add up, or one of them shapes
+        together: the combination that the runs determine; None if the two do not add up, or one of them shapes
             a law.
     """
 
@@ -86,7 +86,7 @@ class TradeOff:
 
     @classmethod
     def from_json_dict(cls, data: Mapping[str, Any] | None) -> TradeOff | None:
-        """The value that a document holds; None where it has none."""
+        """The value in a document; None if it has none."""
         if data is None:
             return None
         first, second = data["parameters"]
@@ -104,7 +104,7 @@ class Role:
             shapes a law.
         frequency: power of the frequency of the motion, dimensionless.
         wind: power of the wind speed, dimensionless.
-        weight: whether mainly the angle under a known weight shows it.
+        weight: whether the angle under a known weight is its main evidence.
         input: whether it acts through the input of driven runs only.
         reading: whether it is an error of the reading, not a moment.
         stated: whether it is an error of a stated stiffness.
@@ -141,8 +141,8 @@ class Setting:
     """The conditions that can be changed between the runs of a rig.
 
     Args:
-        springs: whether its spring can be exchanged, unlike the spring of a joint of a model.
-        driven: whether it is driven.
+        springs: whether the spring can be exchanged, unlike the spring of a joint of a model.
+        driven: whether the rig is driven.
     """
 
     springs: bool
@@ -182,7 +182,7 @@ _RUNS: Sequence[tuple[Callable[[Role], object], Callable[[Setting], str]]] = (
     (lambda role: role.amplitude, _at_other_amplitudes),
     (lambda role: role.frequency, _at_other_frequencies),
 )
-"""Conditions that can be changed, the surest first, and the run that changes each."""
+"""Conditions that can be changed, the most certain first, and the run that changes each."""
 
 
 def separating(first: Role, second: Role, rig: Setting) -> str:
@@ -204,14 +204,14 @@ def trade_off(
     rig: Setting,
     least: float = TRADE_OFF_CORRELATION,
 ) -> TradeOff | None:
-    """The two parameters whose errors are correlated most; None where no correlation is large.
+    """The two parameters with the most strongly correlated errors; None if no correlation is large.
 
     Args:
-        names: of the parameters.
-        covariance: of them, in the products of their units, shape (p, p); a parameter that the fit does not
-            determine has a variance of zero, and is left out.
-        roles: by name.
-        least: absolute correlation from which two parameters trade off, a ratio.
+        names: names of the parameters.
+        covariance: covariance of the parameters, in the products of their units, shape (p, p); a parameter that
+            the fit does not determine has a variance of zero, and is left out.
+        roles: roles by name.
+        least: minimum absolute correlation of two parameters that trade off, a ratio.
     """
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     known = np.flatnonzero((std > 0.0) & np.isfinite(std))
@@ -231,7 +231,7 @@ def of_coefficients(names: Sequence[str], covariance: Array, campaign: Campaign)
     """The trade-off among the coefficients of an estimate.
 
     Args:
-        names: of the coefficients.
-        covariance: of them, in the products of their units, shape (p, p).
+        names: names of the coefficients.
+        covariance: covariance of the coefficients, in the products of their units, shape (p, p).
     """
     return trade_off(names, covariance, ROLES, Setting.of(campaign))

@@ -41,7 +41,8 @@ BAD_INPUT = 2
 INTERRUPTED = 130
 
 CommandLineError = cast("type[Exception]", typer.BadParameter.__mro__[2])
-"""Click's base of all usage errors. Typer exports only its grandchild, and has moved the others about."""
+"""Click's base class of all usage errors. Typer exports only a class derived from it indirectly, at changing
+places."""
 
 app = typer.Typer(
     name="tunnel",
@@ -162,7 +163,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run ``tunnel`` and turn its end or exception into an exit status.
 
     Args:
-        arguments: the words after ``tunnel``; None: the process's.
+        arguments: the words after ``tunnel``; None: the words given to the process.
 
     Returns:
         0 success, 1 a check or an estimate failed, 2 bad input, 130 interrupted.
@@ -204,7 +205,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _by_library(error: SystemExit) -> bool:
-    """Whether Typer or Rich ended the process, as they do at closed pipes and after completing a word."""
+    """Whether Typer or Rich ended the process, as they do for closed pipes and after completing a word."""
     frame = error.__traceback__
     while frame is not None and frame.tb_next is not None:
         frame = frame.tb_next
@@ -213,7 +214,7 @@ def _by_library(error: SystemExit) -> bool:
 
 
 def _left(error: SystemExit) -> int:
-    """Say that the user's code has ended the command."""
+    """Report that the user's code has ended the command."""
     from tunnel_sim.vocabulary.errors import raised_line
 
     print(f"tunnel: the command was ended by its own code ({raised_line(error)})", file=sys.stderr)
@@ -238,7 +239,7 @@ def _settle_output() -> None:
 
 
 def _refuse(reason: str) -> int:
-    """Say what is wrong with the input, in exactly one line."""
+    """Report the fault of the input, in exactly one line."""
     print(f"tunnel: {' '.join(reason.split())}", file=sys.stderr)
     return BAD_INPUT
 

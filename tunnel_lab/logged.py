@@ -22,7 +22,7 @@ def run_logged(log: Path, words: Sequence[str]) -> int:
 
     Args:
         log: an existing file.
-        words: after ``tunnel``.
+        words: words after ``tunnel``.
 
     Returns:
         The exit status.
@@ -33,7 +33,7 @@ def run_logged(log: Path, words: Sequence[str]) -> int:
         os.dup2(stream.fileno(), descriptor)
     now = datetime.now().astimezone().isoformat(timespec="seconds")
     print(f"$ {shlex.join(['tunnel', *words])} (process {os.getpid()}, started {now})", flush=True)
-    from tunnel_lab.cli import main  # after the first line: the bench waits for it
+    from tunnel_lab.cli import main  # after the first line, for which the bench waits
     from tunnel_lab.terminal.progress import print_sets
 
     print_sets(_SETS_EVERY_S)

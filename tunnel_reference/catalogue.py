@@ -37,15 +37,16 @@ class Form:
 
     Args:
         family: public name of the effect, or ``unknown``.
-        symbol: of its severity parameter, with unit.
+        symbol: symbol and unit of the severity parameter.
         start: a typical magnitude of the severity parameter.
         bind: (severity parameter, secondary parameters, conditions) → changed conditions and term.
         signs: possible signs of the severity parameter.
         draw: draws secondary parameters, including random seeds.
         limits: least and greatest magnitude of the severity parameter.
-        driven: whether it acts on driven runs only.
-        edition: of the catalogue in which it joined; a published set is drawn from the catalogue of its time.
-        until: last edition of the catalogue with it; None: it is in the latest one.
+        driven: whether the form acts on driven runs only.
+        edition: first edition of the catalogue with this form; a published set is drawn from the edition of its
+            time.
+        until: last edition of the catalogue with this form; None if the latest edition has it.
     """
 
     family: str
@@ -79,7 +80,8 @@ def moving(law: Law, phase: Phase, make: ParamMaker, *, states: int = 0, at_rele
     """Bind a law of the motion.
 
     Args:
-        make: gives the parameters by run from severity parameter, secondary parameters and conditions.
+        make: a function that gives the parameters by run from severity parameter, secondary parameters and
+            conditions.
         states: number of states per run.
         at_release: whether the states start at the release angle; otherwise at zero.
     """

@@ -33,8 +33,8 @@ def draw_departures(
 
     Args:
         rng: source of all random numbers; not used where no assumption can be broken.
-        certain: the assumptions that are broken at any probability, of `DEPARTURES`.
-        mains: whether mains hum acts, so that the sample rate must not alias it onto the motion.
+        certain: names in `DEPARTURES` of the assumptions that are always broken.
+        mains: whether mains hum acts; the sample rate must then not alias it onto the motion.
     """
     if probability == 0.0 and not set(certain) & set(DEPARTURES):
         return conditions

@@ -70,8 +70,8 @@ def with_disturbances(draws: Sequence[CampaignDraw], rng: np.random.Generator) -
     """Campaigns with a disturbance in one run each.
 
     Args:
-        draws: campaigns whose effects have been scaled.
-        rng: source of run, instant, form, sign and size.
+        draws: campaigns after their effects have been scaled.
+        rng: source of the random run, instant, form, sign and size.
     """
     added = [_draw(rng, draw.conditions) for draw in draws]
     alone = [replace(draw, effects=(one,)) for draw, one in zip(draws, added, strict=True)]

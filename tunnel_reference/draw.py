@@ -36,10 +36,10 @@ def draw_circumstances(
 
     Args:
         rng: source of all random numbers.
-        conditions: of the standard rig.
-        probability: of each change.
-        mains: whether mains hum acts, so that the sample rate must resolve it.
-        certain: the changes that are made at any probability, of ``CIRCUMSTANCES``.
+        conditions: conditions of the standard rig.
+        probability: probability of each change.
+        mains: whether mains hum acts; the sample rate must then resolve it.
+        certain: names in ``CIRCUMSTANCES`` of the changes that are always made.
 
     Returns:
         Conditions of a rig of another scale, with few springs and speeds, coloured noise, or uneven time stamps.
@@ -102,12 +102,13 @@ class EffectDraw:
     """One effect of one campaign.
 
     Args:
-        extra: its secondary parameters.
-        sign: sign of its severity parameter.
+        extra: secondary parameters of the effect.
+        sign: sign of the severity parameter.
         target: required excess of this effect alone, after refitting the nominal model.
         value: magnitude of the severity parameter; a first guess until it is scaled.
         small: whether it is a small effect besides the relevant ones.
-        own: its excess without the part that the other relevant effects can imitate; None until it is known.
+        own: excess of the effect without the part that the other relevant effects can imitate; None until it is
+            known.
     """
 
     form: Form
@@ -124,10 +125,10 @@ class CampaignDraw:
     """One campaign before it is simulated.
 
     Args:
-        kind: one of ``KINDS``.
+        kind: name of the kind, in ``KINDS``.
         effects: the relevant ones, then small ones.
-        seed: of the sensor's noise.
-        scatter: differences between the runs; None where they repeat.
+        seed: seed of the sensor's noise.
+        scatter: differences between the runs; None if the runs repeat.
     """
 
     kind: str
@@ -147,15 +148,16 @@ class Mixture:
         rare: probability that any other form is a rare one (0 for tuning sets).
         variety: probability of another scale, of few runs, of coloured noise and of uneven time stamps, each.
         small: probability of a small effect besides the relevant ones, and of a second one besides the first.
-        certain: circumstances of every campaign, of `tunnel_reference.draw.CIRCUMSTANCES`, and assumptions that all
-            of them break, of `tunnel_reference.departures.DEPARTURES`.
-        departures: probability that an assumption is broken, each.
+        certain: names of the circumstances that every campaign has (`tunnel_reference.draw.CIRCUMSTANCES`), and
+            of the assumptions that every campaign breaks (`tunnel_reference.departures.DEPARTURES`).
+        departures: probability of breaking each assumption.
         driven: whether all runs are driven, or some.
         scatter: probability that the runs differ from each other.
-        level: of these differences, of `tunnel_reference.scatter_draws.LEVELS`, or ``mixed``.
+        level: level of these differences, in `tunnel_reference.scatter_draws.LEVELS`, or ``mixed``.
         stated: probability that a campaign states its differences.
-        normal: probability that they are normally distributed; ``rare`` is the probability of a rare other form.
-        edition: of the catalogue of forms.
+        normal: probability that they are normally distributed; ``rare`` is the probability of a rare other
+            form.
+        edition: edition of the catalogue of forms.
     """
 
     textbook: float = 0.5
@@ -184,8 +186,8 @@ def draw_campaign(
 
     Args:
         rng: source of all random numbers.
-        kind: one of ``KINDS``.
-        families: of the first relevant effects; the others are drawn.
+        kind: name of the kind, in ``KINDS``.
+        families: families of the first relevant effects; the others are drawn.
     """
     if kind not in KINDS:
         raise ValueError(f"kind must be one of {', '.join(KINDS)}, not {kind!r}")

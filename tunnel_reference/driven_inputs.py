@@ -31,12 +31,12 @@ def draw_inputs(rng: np.random.Generator, c: TrueConditions, *, by_root: bool = 
 
     Args:
         rng: source of all random numbers.
-        c: of free decays; it gives the rig's frequencies.
+        c: conditions of free decays, which give the rig's frequencies.
         by_root: whether the input may be the motion of the spring's root.
 
     Returns:
-        The conditions with an input whose linear response reaches half of the stated release angle or more, and
-        with small initial angles and rates in comparison.
+        The conditions with an input. Its linear response reaches half of the stated release angle or more; the
+        initial angles and rates are small in comparison.
     """
     kind = rng.random()
     column = (
@@ -89,7 +89,7 @@ def linear_response(c: TrueConditions, parameters: Array) -> Array:
     """The nominal rig's response to its input from rest at zero, exact for both holds.
 
     Args:
-        c: with an input; stiffness and speed are the stated ones.
+        c: conditions with an input; stiffness and speed are the stated ones.
         parameters: Izz, Cr, Cnβ, Cnr, shape (4,).
 
     Returns:
@@ -110,7 +110,7 @@ def oscillator_response(c: TrueConditions, pole: np.ndarray) -> Array:
     """The response of q̈ − 2 Re λ q̇ + |λ|² q = u from rest to the input as written, exact for both holds.
 
     Args:
-        c: with an input.
+        c: conditions with an input.
         pole: λ by run, shape (runs,), 1/s.
 
     Returns:
@@ -150,12 +150,12 @@ def exerted(
     """The moment of an actuator that starts at the first demand.
 
     Args:
-        asked: demand at the samples, N m, shape (samples, runs).
-        step: between samples, s.
+        asked: demanded moment at the samples, N m, shape (samples, runs).
+        step: time between samples, s.
         held: whether the demand is held between samples, shape (runs,).
 
     Returns:
-        The moment, N m, of that shape, and whether it is held between samples.
+        The moment, N m, in the same shape, and whether it is held between samples.
     """
     limit, most = actuator.limit, actuator.rate * step
     out = limit * np.tanh(asked / limit) if actuator.soft else np.clip(asked, -limit, limit)
@@ -182,9 +182,9 @@ class Inputs:
     Args:
         values: shape (samples, rows).
         linear: 1 where they are linear between samples, 0 where they are held, shape (rows,).
-        delay: s, shape (rows,).
+        delay: delay of each input, s, shape (rows,).
         on_body: whether they are moments on the body; else angles of the spring's root, shape (rows,).
-        rate: of the samples, Hz.
+        rate: sample rate, Hz.
     """
 
     values: Array

@@ -27,7 +27,7 @@ def in_phase(draw: CampaignDraw) -> dict[str, float] | None:
     """Cnβ and Cnr in phase, 1/rad, means over the wind-on runs at their natural frequencies.
 
     Returns:
-        By ``cn_beta`` and ``cn_r``; None where no lag of the air acts.
+        Keys ``cn_beta`` and ``cn_r``; None if no lag of the air acts.
     """
     c, bound = bind_effects(draw)
     laws = [term for term in bound if isinstance(term, BoundLaw) and term.law in _RESPONSES]

@@ -26,7 +26,7 @@ Rows = Places | slice
 
 
 class Phase(IntEnum):
-    """The phase of a stage in which a law acts."""
+    """The part of a stage in which a law acts."""
 
     WIND = 0  # changes the speed ratio
     ANGLE = 1  # changes the angle on which air or spring acts
@@ -39,7 +39,7 @@ class RungeKuttaStage:
     """One RK4 stage of a batch; arrays have shape (rows,). Laws may change the marked arrays.
 
     Args:
-        time: s.
+        time: time of the stage, s.
         beta: body angle, rad.
         rate: body rate, rad/s.
         theta: angle of the rod's upper end, rad (the body's where the rod is rigid).
@@ -50,7 +50,7 @@ class RungeKuttaStage:
         speed_ratio: V(t)/V; changed by laws.
         air_angle: the angle on which Ka acts, rad; changed by laws.
         spring_angle: the angle on which Kr acts, rad; changed by laws.
-        deflection: of the spring: θ less the angle of its root, rad.
+        deflection: deflection of the spring, i.e. θ less the angle of its root, rad.
         top: moment on the upper end, N m; changed by laws.
         body: moment on the body, N m; changed by laws.
         level: friction level at the upper end, N m; changed by laws.
@@ -86,7 +86,7 @@ class BoundLaw:
     """A law bound to the runs of one campaign.
 
     Args:
-        params: arrays whose first axis is the campaign's runs.
+        params: arrays with the campaign's runs as first axis.
         memory: initial states of the law, shape (states, runs); None for a law without states.
     """
 

@@ -44,7 +44,7 @@ def draw_set(count: int, seed: int, shares: dict[str, float], mixture: Mixture) 
     """Draw a set in which all families occur about equally often.
 
     Args:
-        seed: of all random numbers; the same arguments give the same set.
+        seed: seed of all random numbers; the same arguments give the same set.
         shares: relative frequency of each kind.
     """
     root = np.random.SeedSequence(seed)

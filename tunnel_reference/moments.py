@@ -190,7 +190,7 @@ def turbulence(kind: str, conditions: TrueConditions, *, seed: int, scale: float
         kind: ``band`` (flat up to ``scale`` Hz), ``dryden`` or ``von_karman`` (integral length ``scale`` m),
             ``octave`` (a band of one octave about ``scale`` Hz).
         conditions: speeds and duration.
-        scale: Hz or m, depending on ``kind``.
+        scale: frequency, Hz, or length, m, depending on ``kind``.
     """
     n = 2 ** int(np.ceil(np.log2(_length(conditions))))
     frequency = np.fft.rfftfreq(n, 1.0 / RATE)
@@ -232,8 +232,8 @@ def shaking(kind: str, conditions: TrueConditions, *, seed: int, scale: float, r
             (the acceleration of a floor of ``scale`` Hz and damping ratio ``ratio`` under a white force),
             ``octave`` (about ``scale`` Hz), ``traffic`` (flat, swelling and fading by ``ratio`` in some seconds).
         conditions: number of runs and duration.
-        scale: Hz.
-        ratio: dimensionless.
+        scale: frequency, Hz.
+        ratio: damping ratio or modulation, depending on ``kind``, dimensionless.
     """
     n = 2 ** int(np.ceil(np.log2(_length(conditions))))
     frequency = np.fft.rfftfreq(n, 1.0 / RATE)

@@ -34,8 +34,8 @@ class SensorSignal:
 
     Args:
         value: shape (samples, runs), rad.
-        motion: of the rod's upper end.
-        rng: for laws with random numbers.
+        motion: motion of the rod's upper end.
+        rng: random numbers for the laws.
     """
 
     value: Array
@@ -54,7 +54,7 @@ class ReadingTerm:
 
     Args:
         params: arrays of shape (runs,).
-        of_input: whether the same happens to the input as written.
+        of_input: whether the same change is made to the input as written.
     """
 
     law: ReadingLaw
@@ -70,7 +70,7 @@ def read_motion(
 
     Args:
         conditions: the campaign's noise, zero and resolution.
-        motion: of the rod's upper end.
+        motion: motion of the rod's upper end.
         rng: the noise is drawn before the laws draw, so that it does not depend on the effects.
 
     Returns:

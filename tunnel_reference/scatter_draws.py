@@ -39,11 +39,11 @@ class ScatterDraw:
     """The differences between the runs of a campaign.
 
     Args:
-        level: of the widths, of ``LEVELS``.
-        form: of the distribution, of ``FORMS``.
+        level: name of the level of the widths, in ``LEVELS``.
+        form: name of the distribution, in ``FORMS``.
         widths: relative standard deviation by property.
-        deviations: of every run by property, relative, and rad for ``zero``, shape (runs,).
-        stated: the campaign's statement, relative, by property; empty for none.
+        deviations: deviations of every run by property, relative (rad for ``zero``), shape (runs,).
+        stated: the campaign's statement by property, relative; empty if there is none.
     """
 
     level: str
@@ -128,7 +128,7 @@ def draw_scatter(
     Args:
         rng: source of all random numbers.
         runs: number of runs, a count.
-        level: of ``LEVELS``, or ``MIXED``.
+        level: name of the level, in ``LEVELS``, or ``MIXED``.
         normal: probability that the deviations are normal.
         rare: probability that another form is a rare one.
         stated: probability that the campaign states the widths.

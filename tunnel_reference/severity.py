@@ -38,9 +38,9 @@ class Simulated:
 
     Args:
         readings: shape (samples, runs), rad.
-        excess: after refitting the nominal model.
+        excess: excess after refitting the nominal model.
         run_excess: excess by run, shape (runs,).
-        residual: of the nominal model, shape (runs, samples), rad.
+        residual: residual of the nominal model, shape (runs, samples), rad.
     """
 
     draw: CampaignDraw
@@ -66,7 +66,8 @@ def simulate_motions(draws: Sequence[CampaignDraw], *, fine: bool = True) -> lis
     """Integrate campaigns in as few batches as possible.
 
     Args:
-        fine: 10 steps per sample (20 with a flexible rod); otherwise 1 (10), for scaling effects.
+        fine: whether to use 10 steps per sample (20 with a flexible rod); otherwise 1 (10), for scaling
+            effects.
     """
     bound = [bind_effects(d) for d in draws]
     motions: list[RodMotion | None] = [None] * len(draws)

@@ -23,7 +23,7 @@ class TwistingRod:
     Args:
         compliance: 1/Krod, rad/(N m).
         share: share of Izz at the upper end.
-        damping_ratio: of the twist, relative to the inertia of the upper end.
+        damping_ratio: damping ratio of the twist, relative to the inertia of the upper end.
         hardening: h, 1/rad²: the rod's moment is Krod ψ (1 + h ψ²) at twist ψ.
         held_body: whether the body is held until the release (the spring then twists the rod) or the upper end.
     """
@@ -59,13 +59,13 @@ class DrivenInput:
     Args:
         column: ``moment_nm``, ``drive``, ``base_rad``, the angle of the spring's root, or
             ``base_acceleration_rad_s2``, the angular acceleration of the base from which all angles are counted.
-        values: at the samples, N m, units, rad or rad/s², shape (samples, runs).
-        held: whether they are held between samples, shape (runs,); else they are linear.
+        values: input at the samples, N m, units, rad or rad/s², shape (samples, runs).
+        held: whether the values are held between samples, shape (runs,); else they are linear.
         peak: greatest angle of the linear rig's response, rad, shape (runs,); 0 for free decays.
         gain: N m per unit of a ``drive``; minus the inertia for the acceleration of a base; 1 for other columns.
         stated: whether the campaign states the gain.
         delay: time by which the input acts later than its samples, s, shape (runs,) or (1,).
-        actuator: exerts the moment; None where the moment equals the written one.
+        actuator: the actuator that exerts the moment; None where the moment equals the written one.
     """
 
     column: str
@@ -100,10 +100,10 @@ class TrueConditions:
     Args:
         spring_stiffness: stated Kr, N m/rad.
         wind_speed: stated V, m/s.
-        release_angle: nominal, rad.
+        release_angle: nominal release angle, rad.
         start_angle: true release angle (at rest), rad.
         air_density: ρ, kg/m³, the same in all runs or by run.
-        duration: of every run as simulated, s.
+        duration: duration of every run as simulated, s.
         yaw_inertia: Izz, kg m².
         mechanical_damping: Cr, N m s/rad.
         cn_beta: Cnβ, 1/rad.
@@ -112,20 +112,21 @@ class TrueConditions:
         stated_noise: the standard deviation as stated in the campaign; None where it is not stated.
         zero: the sensor's reading at rest in still air, rad.
         resolution: step of the reading, rad.
-        sample_rate: Hz.
+        sample_rate: sample rate, Hz.
         stiffness_scale: true over stated stiffness.
         speed_offset: true minus stated speed where the wind is on, m/s.
-        cn_beta_scale: Cnβ of the run over the campaign's.
+        cn_beta_scale: ratio of the run's Cnβ to the campaign's.
         rod: the flexible rod; None where it is rigid.
         noise_corner: corner frequency of the coloured part of the noise, Hz.
         coloured_share: share of the noise's variance that is coloured.
         clock_jitter: greatest delay of a sample, as a share of the sample interval; the time stamps show it.
-        clock_seed: of the delays.
+        clock_seed: seed of the delays.
         stamp_step: step to which the written time stamps are rounded, s; 0: not rounded.
-        time_scale: time as written over time as simulated. All other times here are as simulated.
-        moment_scale: moments as written over moments as simulated. All other moments here are as simulated.
+        time_scale: ratio of times as written to times as simulated. All other times here are as simulated.
+        moment_scale: ratio of moments as written to moments as simulated. All other moments here are as
+            simulated.
         drive: the input of driven runs; None where all runs are free decays.
-        start_rate: of the motion, rad/s.
+        start_rate: rate of the motion at the start, rad/s.
         noise_scale: ratio of a run's own noise to the campaign's.
         noise_tails: degrees of freedom of Student's t for the white noise; 0: it is normal.
         zero_shift: a run's own zero less the campaign's, rad.

@@ -1,7 +1,7 @@
 """Independent work side by side in processes of this machine.
 
-Every process has one thread: most of the work is Python, which threads cannot share, and the last bit of a sum must
-not depend on the number of threads of a linear algebra library. Measured in benchmarks/sweep_cost.py.
+Every process has one thread. Most of the work is Python, which threads cannot share, and the last bit of a sum
+must not depend on the number of threads of a linear algebra library. Measured in benchmarks/sweep_cost.py.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ ONE_THREAD = (
     "VECLIB_MAXIMUM_THREADS",
     "POLARS_MAX_THREADS",
 )
-"""Variables of the environment that say to the libraries how many threads they may start."""
+"""Environment variables that limit the number of threads of the libraries."""
 
 
 @contextmanager
@@ -47,7 +47,7 @@ def one_blas_thread() -> Iterator[None]:
 
 @cache
 def _libraries() -> ThreadpoolController:
-    """The loaded libraries, whose search takes some milliseconds."""
+    """The loaded libraries; finding them takes some milliseconds."""
     import scipy.linalg  # noqa: F401  # has a library of its own, which must be loaded to be limited
     from threadpoolctl import ThreadpoolController
 
@@ -87,7 +87,7 @@ def in_processes(
 
 
 class Worker:
-    """One process of one thread, whose modules keep their state from one piece of work to the next."""
+    """One process of one thread; its modules keep their state between pieces of work."""
 
     def __init__(self) -> None:
         context = multiprocessing.get_context("spawn")

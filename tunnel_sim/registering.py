@@ -1,7 +1,7 @@
 """Registration of the environments in a process that imports Gymnasium and this package, in any order.
 
-Gymnasium looks for environments in no installed package, and says of a name without its module only that the
-namespace is not found. Importing Gymnasium here would slow every command.
+Gymnasium does not search installed packages for environments; for a name without its module it only says that
+the namespace is not found. Importing Gymnasium here would slow every command.
 """
 
 from __future__ import annotations

@@ -38,11 +38,13 @@ sys.path[:] = header["path"]
 from tunnel_sim.sandbox import _serve
 _serve(header)
 """
-_FEW_ARENAS = {"MALLOC_ARENA_MAX": "2"}  # each reserves 64 MiB of the address space, which is limited
+# number of threads; each reserves 64 MiB of the address space, which is limited
+_FEW_ARENAS = {"MALLOC_ARENA_MAX": "2"}
 _OUT_OF_MEMORY = 77  # exit status
-_OUT_OF_TIME = -getattr(signal, "SIGXCPU", math.inf)  # exit status where Linux or macOS ended it for its time
+# exit status if Linux or macOS ended the process at its time limit
+_OUT_OF_TIME = -getattr(signal, "SIGXCPU", math.inf)
 _START_S = 30.0  # a busy machine may need this long to start a process and to import
-_CLOCK = 4.0  # times the allowed processor time that the work may take by the clock
+_CLOCK = 4.0  # wall time allowed, as a multiple of the allowed processor time
 
 
 class LimitReached(Exception):
@@ -50,13 +52,13 @@ class LimitReached(Exception):
 
 
 class Sandbox:
-    """A process of one thread for one piece of work after another; it is of no use once a limit is reached.
+    """A process of one thread for one piece of work after another; unusable once a limit is reached.
 
     Limits of processor time and memory need Linux or macOS (memory: Linux); elsewhere only the clock applies.
 
     Args:
-        prepare: a function of a module, called before the limits apply: it loads what the work needs.
-        memory: most memory beyond that, bytes.
+        prepare: a function of a module, called before the limits apply; it loads the dependencies of the work.
+        memory: maximum further memory, bytes.
         files: whether the work may open files.
     """
 
@@ -152,7 +154,7 @@ def in_sandbox(
     work: Work, given: dict[str, Any], parts: Sequence[bytes], *, prepare: Callable[[], None],
     seconds: Seconds, memory: int,
 ) -> tuple[dict[str, Any], list[bytes]]:  # fmt: skip
-    """Do work in a `Sandbox` of its own that can open no file; arguments as in `Sandbox` and `Sandbox.do`."""
+    """Do work in a separate `Sandbox` that cannot open files; arguments as in `Sandbox` and `Sandbox.do`."""
     with Sandbox(prepare, memory, files=False) as sandbox:
         return sandbox.do(work, given, parts, seconds)
 
@@ -184,10 +186,10 @@ def _serve(header: dict[str, Any]) -> None:
 
 
 def limit(seconds: Seconds | None, memory: int | None = None, *, files: bool = True) -> None:
-    """Limit what this process uses from now on, where the system can; arguments as in `Sandbox`, None: no limit."""
+    """Limit the further resources of this process, if the system can; arguments as in `Sandbox`, None: no limit."""
     most: dict[str, int] = {"RLIMIT_CORE": 0} | ({} if files else {"RLIMIT_NOFILE": 0})
     if seconds is not None:
-        most["RLIMIT_CPU"] = math.ceil(time.process_time() + seconds)  # counts whole seconds
+        most["RLIMIT_CPU"] = math.ceil(time.process_time() + seconds)  # the limit is in whole seconds
     if memory is not None:
         with suppress(OSError, AttributeError):
             used = int(Path("/proc/self/statm").read_bytes().split()[0]) * os.sysconf("SC_PAGE_SIZE")
@@ -211,7 +213,7 @@ def _send(stream: BinaryIO, head: dict[str, Any], parts: Sequence[bytes | memory
 
 
 def _received(stream: BinaryIO) -> tuple[dict[str, Any], list[bytes]]:
-    """The data sent by `_send`; EOFError where the other process has ended."""
+    """The data sent by `_send`; EOFError if the other process has ended."""
     line = stream.readline()
     if not line.endswith(b"\n"):
         raise EOFError

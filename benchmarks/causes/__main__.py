@@ -21,7 +21,7 @@ from tunnel_sim.vocabulary.errors import TunnelError, counted, did_you_mean
 
 
 def _folder(given: argparse.Namespace) -> Path:
-    """The folder of the set; by default that of its version."""
+    """The folder of the set; by default the folder of its version."""
     folder: Path | None = given.folder
     return Path("tunnel-output") / f"causes-v{given.version}" if folder is None else folder
 
@@ -30,7 +30,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command.
 
     Args:
-        arguments: of the command line; None: the process's own.
+        arguments: arguments of the command line; None: the process's.
 
     Returns:
         The exit status.
@@ -73,7 +73,7 @@ def _whole(least: int) -> Callable[[str], int]:
             raise ValueError
         return int(text)
 
-    whole_number.__name__ = f"whole number from {least}"  # in the message of argparse
+    whole_number.__name__ = f"whole number from {least}"  # shown in the message of argparse
     return whole_number
 
 

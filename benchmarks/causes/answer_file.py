@@ -18,7 +18,7 @@ from tunnel_sim.files.reading import as_described, read_json
 from tunnel_sim.files.toml_input import NotNegative, Positive, StrictModel
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, shown
 
-_ROUNDING = 1e-6  # of the sum of probabilities
+_ROUNDING = 1e-6  # tolerance of the sum of probabilities
 _LABELS = (*NAMES, *SCATTERS, UNKNOWN)
 _SEE = "see benchmarks/causes/answer.schema.json"
 
@@ -81,7 +81,7 @@ def read_answers(folder: Path) -> dict[str, dict[str, Any]]:
     """The answers of a folder by campaign.
 
     Args:
-        folder: of one JSON file for each campaign.
+        folder: folder of one JSON file for each campaign.
 
     Raises:
         TunnelError: when there are no files, or a file is not an answer.
@@ -102,7 +102,7 @@ def read_answers(folder: Path) -> dict[str, dict[str, Any]]:
 
 
 def _check(answer: AnswerFile, campaign: str, where: str) -> None:
-    """Refuse what the types of the fields allow and no score can count."""
+    """Refuse content that the types of the fields allow but no score can count."""
     if answer.campaign != campaign:
         what = f"answers the campaign '{answer.campaign}', but its name is of '{campaign}'"
         raise TunnelError(

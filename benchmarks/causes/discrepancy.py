@@ -1,9 +1,10 @@
 """Errors of a model as a basis of changes of the readings, and the log evidence of a fit under these errors.
 
-r = J δ + B a + e: residuals of a fit, its sensitivities, and a basis with coefficients a of standard deviation η.
-B has moments of the angle and the rate, the same in the wind, moments that change in time, errors of the reading,
-and slow modulations of every run's own harmonics. Each of these five kinds has an equal part of the prior power. η²
-is the power of the model's error over that of the gap. Rows are averages of the residuals, 24 in a cycle.
+r = J δ + B a + e: residuals of a fit, its sensitivities, and a basis with coefficients a of standard deviation
+η. B has moments of the angle and the rate, the same in the wind, moments that change in time, errors of the
+reading, and slow modulations of every run's own harmonics. Each of these five kinds has an equal part of the
+prior power. η² is the power of the model's error over the power of the gap. Rows are averages of the residuals,
+24 in a cycle.
 """
 
 from __future__ import annotations
@@ -24,9 +25,10 @@ Array = NDArray[np.float64]
 
 ETA: Array = np.geomspace(1e-3, 3.0, 36)
 """Grid of η, the rms of the model's error over the rms of the gap."""
-_DIRECTIONS = 260  # retained directions of the basis, of the greatest power beside the nominal model
+# number of retained directions of the basis, of the greatest power beside the nominal model
+_DIRECTIONS = 260
 _WIDE, _SETTLED = 33.0, 0.02
-_NUISANCE = 100.0  # prior power of a nominal parameter, gaps
+_NUISANCE = 100.0  # prior power of a nominal parameter, in gaps
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +36,7 @@ class Linear:
     """A fit near its optimum.
 
     Args:
-        residual: in standard deviations of the noise, shape (rows,).
+        residual: residual in standard deviations of the noise, shape (rows,).
         slopes: derivatives of the prediction to its parameters, shape (rows, p).
         nominal: whether each parameter belongs to the nominal model, shape (p,).
         own: number of runs that share the power of each parameter, shape (p,); 1 for common parameters.
@@ -50,7 +52,7 @@ def linear(fit: Any, along: Sequence[Path]) -> Linear:
     """Rows of a fit: its common parameters first, then the parameters of every run.
 
     Args:
-        fit: of the diagnosis, to the runs of ``along``.
+        fit: fit of the diagnosis, to the runs of ``along``.
         along: paths of the nominal fit, which define the averaging of residuals.
     """
     residuals, slopes, problem = fit.residuals, fit.jacobian, fit.problem
@@ -72,7 +74,7 @@ class ErrorEvidence:
 
     Args:
         log: log evidence for every ``ETA``, shape (36,).
-        left: expected power of the model's error beside the parameters, over the gap, shape (36,).
+        left: expected power of the model's error beside the parameters, over the power of the gap, shape (36,).
         alone: residual χ² of the parameters without any error of the model.
         occam: log of the posterior's volume over the prior's.
     """
@@ -91,7 +93,7 @@ class Discrepancy:
         along: paths of the nominal fit, which define the averaging of residuals.
         gap: χ² of the nominal fit in excess of noise.
         nominal_std: prior standard deviations of the nominal parameters, as in `Linear`.
-        basis: B, of the power of the gap beside the nominal parameters, shape (rows, k).
+        basis: B, with the power of the gap beside the nominal parameters, shape (rows, k).
     """
 
     along: Sequence[Path]
@@ -126,7 +128,7 @@ class Discrepancy:
         """Log evidence of a fit; the prior power of further parameters equals the gap's.
 
         Args:
-            given: from `linear`, with the nominal parameters in the order of the nominal fit.
+            given: rows from `linear`, with the nominal parameters in the order of the nominal fit.
         """
         scaled, r, basis = given.slopes * self._prior(given), given.residual, self.basis
         root = np.linalg.cholesky(scaled.T @ scaled + np.eye(scaled.shape[1]))

@@ -21,7 +21,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 
 SCHEMA = Path(__file__).parent / "answer.schema.json"
 UNKNOWN = "unknown"
-_LAST_PLACE = 32  # in the vocabulary when the sets were drawn: they do not have later effects
+_LAST_PLACE = 32  # last place in the vocabulary of the sets: they do not have later effects
 KINDS = tuple(kind for kind in ALL_EFFECTS if kind.place <= _LAST_PLACE)
 """The vocabulary of the sets."""
 NAMES: tuple[str, ...] = tuple(
@@ -37,9 +37,9 @@ class About:
     """The description of a method, for the table.
 
     Args:
-        title: its name in the table.
+        title: name in the table.
         setting: the documented setting, in a sentence.
-        names: causes that it can name, including `unknown` where applicable.
+        names: causes that it can name, including `unknown` if applicable.
         not_seen: tracks that it cannot process, marked "–" in the table.
         program: address of its program, for the page; empty: not stated.
     """
@@ -60,8 +60,8 @@ def answer_of(
     """An answer as a document.
 
     Args:
-        causes: names; empty without a gap, ``["unknown"]`` where a gap has no cause in the vocabulary.
-        probability: that each cause acts, by name; 0 for missing names.
+        causes: names; empty without a gap, ``["unknown"]`` if no cause in the vocabulary explains the gap.
+        probability: probability that each cause acts, by name; 0 for missing names.
         sets: sets of causes with their probabilities; empty: causes count as independent.
         coefficients: ``before`` and ``after`` the causes are added, each ``cn_beta`` and ``cn_r`` (1/rad) with
             ``value`` and ``std``; None: not estimated.
@@ -88,10 +88,11 @@ def answer_all(
         campaigns: folder of the campaigns.
         answers: folder of the answers; an interrupted run is continued.
         jobs: number of processes.
-        first: number of campaigns to answer, the first by name; None: all.
+        first: number of campaigns to answer, in the order of names; None: all.
 
     Returns:
-        The number of new answers. Where the method fails, ``causes`` is null with the error, which counts as wrong.
+        The number of new answers. If the method fails, ``causes`` is null with the error, which counts as
+        wrong.
     """
     answers.mkdir(parents=True, exist_ok=True)
     todo = [f for f in campaign_folders(campaigns)[:first] if not (answers / f"{f.name}.json").exists()]
@@ -118,7 +119,7 @@ def main(answer: Answer, arguments: Sequence[str] | None = None) -> None:
 
     Args:
         answer: function of one campaign's folder.
-        arguments: of the command line; None: the process's own.
+        arguments: arguments of the command line; None: the process's.
     """
     parser = argparse.ArgumentParser(description="Answer campaigns, one JSON file each.")
     parser.add_argument("campaigns", type=Path)

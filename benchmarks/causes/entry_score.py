@@ -33,8 +33,9 @@ from tunnel_sim.vocabulary.errors import TunnelError
 FLOOR = 0.01
 """Least probability that the log score counts, and one minus the greatest: nobody knows better from so "
 "few trials."""
-WITHIN = 2.0  # standard deviations of a coefficient
-_SETS = 60  # most listed sets of independent causes; the remaining probability is in no credible set
+WITHIN = 2.0  # maximum error of a coefficient in standard deviations
+# maximum number of listed sets of independent causes; the remaining probability is in no credible set
+_SETS = 60
 
 
 def likely_sets(answer: Mapping[str, Any]) -> list[tuple[tuple[str, ...], float]]:
@@ -68,7 +69,7 @@ def as_case(name: str, truth: Mapping[str, Any], answer: Mapping[str, Any]) -> C
     """Truth and answer of a campaign in the form of the blind checks.
 
     Args:
-        truth: from the key.
+        truth: truth from the key.
         answer: an entry's document.
     """
     seconds = float(answer.get("seconds", 0.0))
@@ -165,10 +166,10 @@ def score(
     """The score of an entry, as a file of ``results``.
 
     Args:
-        folder: of the set.
-        key: its document, as `benchmarks.causes.make.check` returns it.
-        answers: by campaign; campaigns without an answer are not scored, and their number is stated.
-        name: of the method.
+        folder: folder of the set.
+        key: document of the key, as returned by `benchmarks.causes.make.check`.
+        answers: answers by campaign; campaigns without an answer are not scored, and their number is stated.
+        name: name of the method.
         about: description of the method.
 
     Raises:

@@ -24,11 +24,11 @@ class FittedCauses:
     """A set of causes fitted to a campaign.
 
     Args:
-        names: of the causes, in the order of their addition.
+        names: names of the causes, in the order of their addition.
         chi2: sum of the squared residuals in noise variances.
         rows: number of residuals.
         numbers: number of parameters of the causes, including the parameters of single runs.
-        fit: of the diagnosis.
+        fit: fit of the diagnosis.
     """
 
     names: tuple[str, ...]
@@ -47,7 +47,7 @@ class FittedCauses:
         """The fit with a further cause, in its textbook form; None where it cannot be fitted.
 
         Args:
-            name: of the cause.
+            name: name of the cause.
         """
         kind = {kind.name: kind for kind in KINDS}[name]
         found = one_more(self.fit, kind)
@@ -58,7 +58,7 @@ def nominal(folder: Path) -> tuple[FittedCauses, tuple[str, ...], bool]:
     """The nominal model fitted to a campaign.
 
     Args:
-        folder: of the campaign.
+        folder: folder of the campaign.
 
     Returns:
         The fit; causes detected in the records before any fit (hum and a coarse step); and whether a gap is
@@ -94,7 +94,7 @@ def grown(folder: Path) -> Grown:
     """All fits of `tunnel diagnose` to a campaign, before its own weights.
 
     Args:
-        folder: of the campaign.
+        folder: folder of the campaign.
 
     Raises:
         TunnelError: when the records are refused.

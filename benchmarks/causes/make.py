@@ -30,7 +30,7 @@ CHUNK = 10  # campaigns simulated together; larger chunks are hardly faster
 
 
 def published(version: int = VERSION) -> Path:
-    """Where the seal of a version is published; it need not exist yet."""
+    """Place of the published seal of a version; the file need not exist yet."""
     return Path(__file__).parent / f"v{version}" / SEAL
 
 
@@ -43,16 +43,16 @@ def make(
     jobs: int = 1,
     salt: str | None = None,
 ) -> Path:
-    """Make a set; an interrupted one is continued.
+    """Make a set; an interrupted set is continued.
 
     Args:
-        out: its folder.
-        version: of the set, of ``EDITIONS``.
-        seed: of all random numbers; the same arguments give the same numbers. None: the seed of the version.
+        out: folder of the set.
+        version: version of the set, a key of ``EDITIONS``.
+        seed: seed of all random numbers; equal arguments give equal numbers. None: the seed of the version.
         counts: number of campaigns by track; None: the numbers of the version.
         jobs: number of processes.
-        salt: random text in the key, to prevent finding its hash by trial of truths; None: derived from the seed,
-            as in the published set, whose key everyone can make.
+        salt: random text in the key, which prevents finding its hash by trying truths; None: derived from the
+            seed, as in the published set, so that everyone can make its key.
 
     Returns:
         The seal's file.
@@ -89,10 +89,10 @@ def make(
 
 
 def is_edition(made_with: Mapping[str, Any]) -> bool:
-    """Whether a set is one of ``EDITIONS``, and not of another seed or with other numbers of campaigns.
+    """Whether a set is one of ``EDITIONS``, not of another seed or with other numbers of campaigns.
 
     Args:
-        made_with: from the key of the set.
+        made_with: arguments from the key of the set.
     """
     edition = EDITIONS[made_with["version"]]
     return made_with["seed"] == edition.seed and made_with["counts"] == edition.counts
@@ -136,7 +136,7 @@ def data_hash(folder: Path) -> str:
     """SHA-256 over the statements of a campaign and the numbers of its runs, in hexadecimal.
 
     Args:
-        folder: of one campaign.
+        folder: folder of one campaign.
     """
     found = hashlib.sha256((folder / "campaign.toml").read_bytes())
     for path in sorted((folder / "runs").iterdir()):
@@ -156,9 +156,9 @@ def check(folder: Path, published: Path | None = None) -> dict[str, Any]:
     """Check a set against its seal, and open its key.
 
     Args:
-        folder: of the set.
-        published: a seal whose campaigns the set must have; None: none. Its key may differ in the last digits of
-            severities, which depend on the linear algebra library.
+        folder: folder of the set.
+        published: a seal with the required campaigns of the set; None: none. Its key may differ in the last
+            digits of severities, which depend on the linear algebra library.
 
     Returns:
         The key's document.
@@ -183,11 +183,11 @@ def check(folder: Path, published: Path | None = None) -> dict[str, Any]:
 
 
 def differing(seal: Mapping[str, Any], published: Path) -> list[str]:
-    """Names of the campaigns whose hashes differ from the published ones.
+    """Names of the campaigns with hashes that differ from the published ones.
 
     Args:
-        seal: of a set.
-        published: the seal's file of a version.
+        seal: seal of a set.
+        published: file of the published seal of a version.
     """
     other, own = read_json(published, remedy="restore it")["campaigns_sha256"], seal["campaigns_sha256"]
     return sorted(name for name in {**other, **own} if other.get(name) != own.get(name))
@@ -197,7 +197,7 @@ def truths_by_track(key: Mapping[str, Any]) -> dict[str, list[str]]:
     """Names of campaigns by track, in the order of the tracks.
 
     Args:
-        key: its document.
+        key: document of the key.
     """
     found: dict[str, list[str]] = {
         name: [] for name in (*(n for e in EDITIONS.values() for n in e.tracks), REAL)

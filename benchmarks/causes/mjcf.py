@@ -31,7 +31,7 @@ BOUNDS = {
     "wind_speed_drift": (-50.0, 50.0), "unsteady_aero_lag": (-50.0, 50.0), "flow_misalignment": (-50.0, 50.0),
     "wind_speed_offset": (-50.0, 50.0),
 }  # fmt: skip
-"""Causes of one number, and its bounds in hundredths of the rig's own scales."""
+"""Causes with one number, and its bounds in hundredths of the rig's own scales."""
 _WINDY = tuple(BOUNDS)[-5:]
 _XML = """<mujoco><compiler angle="radian"/>
 <option timestep="{step}" integrator="RK4" gravity="0 0 0"><flag contact="disable"/></option>
@@ -50,7 +50,7 @@ class ToolboxRun:
         rows: means of the reading's blocks, rad, shape (n,).
         noise: standard deviation of a row, rad.
         interval: between rows, s.
-        start: angle (rad) and rate (rad/s) at the first row of the damped sinusoid nearest to the run.
+        start: angle (rad) and rate (rad/s) at the first row, of the damped sinusoid nearest to the run.
         decay: angular frequency (rad/s), decay (1/s) and resting angle (rad) of that sinusoid.
         spring: stated stiffness, N m/rad.
         wind: ½ρV A l, kg m/s: times V and Cnβ the stiffness, times l and Cnr the damping.
@@ -68,7 +68,7 @@ class ToolboxRun:
 
     @classmethod
     def of(cls, run: Run, size: float) -> ToolboxRun:
-        """Thin one run out; `size` is the frontal area times the reference length, m³."""
+        """Thin one run; `size` is the frontal area times the reference length, m³."""
         record, (omega, sigma, rest) = run.record, own_decay(run)
         y, dt = record.yaw_rad, record.sample_interval
         if not record.uniform:
@@ -86,7 +86,7 @@ class ToolboxRun:
 
 @dataclass(frozen=True, eq=False)
 class ToolboxFit:
-    """A set of causes fitted: parameters by name, their values and two of each release, residuals and Jacobian."""
+    """A set of causes fitted: parameters by name, their values and two for each release, residuals and Jacobian."""
 
     causes: tuple[str, ...]
     names: tuple[str, ...]
@@ -239,8 +239,8 @@ class ToolboxRig:
 
         Args:
             causes: names of the causes.
-            names: of the parameters of the rig.
-            x: starting values: these parameters and two of each release.
+            names: names of the parameters of the rig.
+            x: starting values of these parameters and of two for each release.
         """
         from mujoco import sysid
 

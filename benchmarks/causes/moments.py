@@ -1,9 +1,9 @@
 """The residual moment of a campaign and the moments of its causes, for methods of regression.
 
-Nothing here comes from the project's fits. The equation of motion is used in its weak form: with L = D² +
-2σD + ω² of a run's own frequency and decay, L β = (ω² − Kr/Izz) β + (2σ − Cr/Izz) β̇ + moments / Izz. L⁻¹ is
-applied to both sides. The noise of the rows is then the noise of the reading, small moments add up over the swings,
-and all unknowns are linear. The right-hand side is evaluated along the motion, smoothed by polynomials over a
+Nothing here comes from the project's fits. The equation of motion is used in its weak form: with L = D² + 2σD +
+ω² of a run's own frequency and decay, L β = (ω² − Kr/Izz) β + (2σ − Cr/Izz) β̇ + moments / Izz. L⁻¹ is applied
+to both sides. The noise of the rows is then the noise of the reading, small moments add up over the swings, and
+all unknowns are linear. The right-hand side is evaluated along the motion, smoothed by polynomials over a
 quarter of a cycle.
 """
 
@@ -40,13 +40,13 @@ class Equations:
     """Rows of the weak equation of motion of all runs, in standard deviations of the reading's noise.
 
     Args:
-        target: reading minus the response to its own restoring and damping moments, shape (rows,).
+        target: reading minus its response to the nominal restoring and damping moments, shape (rows,).
         nominal: columns of the nominal model and of the releases, shape (rows, p).
         causes: columns by name of the cause, each of shape (rows, k).
         run: the run of every row, shape (rows,).
-        phase: of the motion, 0 to 2π, shape (rows,).
+        phase: phase of the motion, 0 to 2π, shape (rows,).
         level: amplitude of the motion over the largest, shape (rows,).
-        time: since the start of the run over its length, shape (rows,).
+        time: time since the start of the run over the run's length, shape (rows,).
     """
 
     target: Array
@@ -218,7 +218,7 @@ def moments_of(
 
 
 DETECTED = 1.15  # mean square of the rows above which there is a gap; 1.00 ± 0.05 without a gap
-CLOSED = 0.5  # least share of the gap that named causes explain: most of it
+CLOSED = 0.5  # minimum share of the gap that named causes explain: most of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,7 +256,7 @@ class Regression:
         """Residual mean square with causes.
 
         Args:
-            names: of the causes.
+            names: names of the causes.
         """
         if not names:
             return self.gap
@@ -265,7 +265,7 @@ class Regression:
         return float(rest @ rest) / rest.size
 
     def verdict(self, named: Sequence[str]) -> list[str]:
-        """The answer from a regression's causes: none without a gap, `unknown` where most of it is unexplained.
+        """The answer from a regression's causes: none without a gap, `unknown` if most of the gap is unexplained.
 
         Args:
             named: causes that the regression selects.

@@ -24,10 +24,11 @@ class Classifier:
     """Trained networks.
 
     Args:
-        networks: weights of each by ``LAYERS``, shape (inputs + 1, outputs), the last row the bias.
+        networks: weights of each network by ``LAYERS``, shape (inputs + 1, outputs), the last row the bias.
         scaling: mean and standard deviation of the statistics of a run, shape (2, k), and of all runs, (2, m).
         temperature: divisor of the logits.
-        facts: of the training: campaigns, simulation_s, training_s, held_out (nats), width, decay, dropout.
+        facts: facts of the training: campaigns, simulation_s, training_s, held_out (nats), width, decay,
+            dropout.
     """
 
     networks: Sequence[Mapping[str, Array]]
@@ -39,8 +40,8 @@ class Classifier:
         """Probability of every label.
 
         Args:
-            runs: shape (runs, k), from `benchmarks.causes.summaries.summaries`.
-            whole: shape (m,), from the same.
+            runs: statistics of the runs, shape (runs, k), from `benchmarks.causes.summaries.summaries`.
+            whole: statistics of all runs together, shape (m,), from the same function.
         """
         (mean, std), (whole_mean, whole_std) = self.scaling
         x, w = scaled(runs, mean, std), scaled(whole, whole_mean, whole_std)
@@ -51,7 +52,7 @@ class Classifier:
         """Write the classifier as safetensors.
 
         Args:
-            path: of the file, ``.safetensors``.
+            path: path of the file, ``.safetensors``.
         """
         from safetensors.numpy import save_file
 
@@ -67,7 +68,7 @@ def read_classifier(path: Path = WEIGHTS) -> Classifier:
     """Read a trained classifier.
 
     Args:
-        path: of the file.
+        path: path of the file.
 
     Raises:
         TunnelError: when the file is missing or is not a classifier.

@@ -39,9 +39,9 @@ class NetworkSetting:
     """A network and its training.
 
     Args:
-        width: of the hidden layers.
-        decay: of the weights.
-        dropout: a share.
+        width: width of the hidden layers.
+        decay: decay of the weights.
+        dropout: share of dropped units.
     """
 
     width: int
@@ -56,8 +56,8 @@ def make_campaigns(folder: Path, number: int, *, chunk: int = CHUNK) -> float:
     """Simulate the missing training campaigns.
 
     Args:
-        folder: of the campaigns; ``truths`` has the acting causes of each, and the processor time.
-        number: of campaigns.
+        folder: folder of the campaigns; ``truths`` has the acting causes of each, and the processor time.
+        number: number of campaigns.
         chunk: number of campaigns simulated together.
 
     Returns:
@@ -151,10 +151,10 @@ def trained(
     A network stops at the least loss on its held-out fold. The temperature is optimal on the held-out folds.
 
     Args:
-        samples: of the training campaigns.
-        seed: of folds, first weights and order.
-        settings: to try.
-        epochs: greatest number.
+        samples: samples of the training campaigns.
+        seed: seed of folds, first weights and order.
+        settings: settings to try.
+        epochs: maximum number of epochs.
 
     Returns:
         The classifier, without the facts of the simulation.
@@ -264,7 +264,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command.
 
     Args:
-        arguments: of the command line; None: the process's own.
+        arguments: arguments of the command line; None: the process's.
 
     Returns:
         The exit status.

@@ -21,7 +21,7 @@ PAGE = ROOT / "docs" / "benchmark-of-causes.md"
 FIGURE = ROOT / "docs" / "images" / "benchmark-of-causes.png"
 OURS = "ours"
 _TRACKS = (*TRACKS, REAL)
-_SCATTERING = 2  # the version whose runs do not repeat
+_SCATTERING = 2  # the version with runs that do not repeat
 
 
 def results_of(version: int) -> Path:
@@ -33,11 +33,11 @@ def read_results(folder: Path = RESULTS, version: int = VERSION) -> list[dict[st
     """The results, in decreasing order of the share of exact sets.
 
     Args:
-        folder: of one file for each method.
-        version: of the set.
+        folder: folder of one file for each method.
+        version: version of the set.
 
     Raises:
-        TunnelError: when a file is not a result, or is of another set.
+        TunnelError: when a file is not a result, or belongs to another set.
     """
     found = []
     for path in sorted(folder.glob("*.json")):
@@ -83,7 +83,7 @@ def page_text(
     Args:
         found: results, best first.
         image: address of the figure.
-        scattering: results on the campaigns whose runs do not repeat, best first.
+        scattering: results on the campaigns with runs that do not repeat, best first.
     """
     parts = [
         "# Benchmark of causes\n",
@@ -206,7 +206,7 @@ def _causes(r: Mapping[str, Any]) -> list[str]:
 
 
 def _scatter_table(found: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Campaigns whose runs do not repeat exactly; nothing without results."""
+    """Campaigns with runs that do not repeat exactly; nothing without results."""
     if not found:
         return []
     edition = EDITIONS[_SCATTERING]
@@ -290,7 +290,7 @@ def _about(r: Mapping[str, Any], found: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _other_set(r: Mapping[str, Any]) -> str:
-    """The difference of a result's set from the published one, as a sentence; empty where none is known."""
+    """The difference of a result's set from the published one, as a sentence; empty if none is known."""
     known = read_json(published(r["version"]), remedy="restore it")["key_sha256"]
     differing = r.get("differing")  # results of earlier days do not record it
     if differing:

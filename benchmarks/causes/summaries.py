@@ -23,10 +23,10 @@ def summaries(campaign: Campaign) -> tuple[Array, Array]:
     """The summary statistics of a campaign.
 
     Args:
-        campaign: of free decays.
+        campaign: campaign of free decays.
 
     Returns:
-        Statistics of every run, shape (runs, k), and of all together, shape (m,), dimensionless.
+        Statistics of every run, shape (runs, k), and of all runs together, shape (m,), dimensionless.
     """
     found = equations_of(campaign)
     left, causes = found.residuals()
@@ -55,10 +55,10 @@ def summaries(campaign: Campaign) -> tuple[Array, Array]:
 
 
 def mirrored(runs: Array) -> Array:
-    """The statistics of the runs with every reading's sign changed.
+    """The statistics of the runs if the sign of every reading is changed.
 
     Args:
-        runs: from `summaries`, shape (runs, k).
+        runs: statistics from `summaries`, shape (runs, k).
     """
     found = runs.copy()
     sign = np.ones((STRETCHES, _PER_STRETCH))

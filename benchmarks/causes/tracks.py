@@ -24,12 +24,12 @@ class Track:
 
     Args:
         count: number of campaigns.
-        kinds: weight of each kind of campaign, of `tunnel_reference.draw.KINDS`.
-        certain: circumstances of every campaign, of `tunnel_reference.draw.CIRCUMSTANCES`.
+        kinds: weight of each kind of campaign in `tunnel_reference.draw.KINDS`.
+        certain: circumstances of every campaign, from `tunnel_reference.draw.CIRCUMSTANCES`.
         first: families that act in turn, one in every campaign; empty: all.
         about: description in a few words.
         scatter: whether the runs differ by chance.
-        level: of the scatter, of `tunnel_reference.scatter_draws.LEVELS`, or ``mixed``.
+        level: level of the scatter, from `tunnel_reference.scatter_draws.LEVELS`, or ``mixed``.
         stated: share of campaigns that state their scatter.
         normal: share of campaigns with normal scatter; the others have another distribution.
     """
@@ -60,7 +60,7 @@ TRACKS: Mapping[str, Track] = {
         16, _ANY, "coloured noise; rounded or jittered time stamps", ("coloured", "uneven_stamps")
     ),
 }  # fmt: skip
-"""The simulated tracks of version 1; the packaged measured records are one more, ``real``."""
+"""The simulated tracks of version 1; the packaged measured records are a further track, ``real``."""
 
 _SCATTERING: Mapping[str, Track] = {
     "scatter_alone": Track(
@@ -82,8 +82,8 @@ class Edition:
     """A separate set, with its own seal.
 
     Args:
-        seed: of all random numbers.
-        tracks: by name.
+        seed: seed of all random numbers.
+        tracks: tracks by name.
         real: whether the set includes the packaged measured records.
         catalogue: edition of the reference simulator's forms when the set was drawn.
     """
@@ -115,8 +115,8 @@ class TrackDraw:
     """One campaign to simulate.
 
     Args:
-        name: in the set; it does not reveal the track.
-        track: of an edition.
+        name: name in the set; it does not reveal the track.
+        track: track of an edition.
         draw: the campaign before its effects are scaled.
     """
 
@@ -129,7 +129,7 @@ def draw_all(seed: int, counts: Mapping[str, int]) -> list[TrackDraw]:
     """Draw the simulated campaigns.
 
     Args:
-        seed: of all random numbers; the same arguments give the same campaigns.
+        seed: seed of all random numbers; equal arguments give equal campaigns.
         counts: number of campaigns by track, all of one version.
 
     Returns:

@@ -29,7 +29,7 @@ from tunnel_sim.vocabulary.record import Array
 
 
 def share_closed(before: float, after: float) -> float:
-    """Explained share of a gap, 0 to 1.
+    """Explained share of a gap, from 0 to 1.
 
     Args:
         before: excess of the nominal model, in noise variances of a sample.
@@ -44,7 +44,8 @@ class Step:
 
     Args:
         effect: name of the cause added; None for the nominal model.
-        excess: with it and all causes before it, on held-out readings, in noise variances of a sample.
+        excess: excess with this cause and all causes before it, on held-out readings, in noise variances of a
+            sample.
     """
 
     effect: str | None
@@ -56,9 +57,9 @@ class Waterfall:
     """The residual gap as the causes are added one after another.
 
     Args:
-        steps: the nominal model first; then the cause that closes most, and so on.
-        without: held-out excess by cause, with only that cause removed and the others refitted. A cause beside a
-            random moment has none: the random moment would absorb it.
+        steps: the nominal model first, then the cause that closes most of the gap, and so on.
+        without: held-out excess by cause, with only that cause removed and the others refitted. Beside a random
+            moment a cause has none: the random moment would absorb it.
     """
 
     steps: tuple[Step, ...] = ()
@@ -94,21 +95,21 @@ class HeldOut:
     """Predictions of runs held out of the fit.
 
     Args:
-        residuals: by run id: reading minus prediction in noise standard deviations; only the run's own parameters
-            are refitted.
-        points: by run id: the common parameters found without it, and its own.
+        residuals: by run id: reading minus prediction in noise standard deviations, with only the run's own
+            parameters refitted.
+        points: by run id: the common parameters found without the run, and the run's own parameters.
     """
 
     residuals: dict[str, Array]
     points: dict[str, tuple[Array, Array]]
 
 
-#: Of fits that are still in use: the waterfall, the patch and the remainder ask for the same ones.
+#: For fits still in use: the waterfall, the patch and the remainder ask for the same ones.
 _KNOWN: WeakKeyDictionary[Fit, HeldOut] = WeakKeyDictionary()
 
 
 def predict_held_out(whole: Fit) -> HeldOut:
-    """Refit without each group of runs, starting from the fit of all, and predict the group; once for each fit."""
+    """Refit without each group of runs, from the fit of all, and predict the group; cached for each fit."""
     if whole not in _KNOWN:
         _KNOWN[whole] = _held_out(whole)
     return _KNOWN[whole]
@@ -124,7 +125,7 @@ def _held_out(whole: Fit) -> HeldOut:
         seen = [np.full(run.reading.size, run.id not in group) for run in data.runs]
         try:
             common = fit_seen(whole, seen)[0].common
-            released, left = refit_releases(
+            released, remaining = refit_releases(
                 replace(whole.problem, data=data.subset(tuple(ids[i] for i in out))),
                 Point(common, whole.point.per_run[out]),
                 [whole.jacobian[i][1] for i in out],
@@ -132,23 +133,24 @@ def _held_out(whole: Fit) -> HeldOut:
         except (FitError, np.linalg.LinAlgError):
             continue
         for k, i in enumerate(out):
-            residuals[ids[i]] = left[k]
+            residuals[ids[i]] = remaining[k]
             points[ids[i]] = (released.common, released.per_run[k])
     return HeldOut(residuals, points)
 
 
-_STRETCHES = 9  # in a run: each a ninth of it, or a cycle where the run is short
+_STRETCHES = 9  # stretches in a run: each is a ninth of it, or a cycle if the run is short
 
 Turns = Sequence[NDArray[np.int64]]
 
 
 def turns_of(nominal: Fit, ids: Collection[str]) -> list[NDArray[np.int64]]:
-    """The turn in which every block of every run is held out of the fit.
+    """For every block of every run, the number of the refit from which it is held out.
 
     See docs/decisions/0016-held-out-cause-by-cause.md.
 
     Returns:
-        By run, shape (n,): the turn, or −1 in the other runs. Every third stretch has the same turn.
+        By run, shape (n,): the number, or −1 in runs that are not divided. Every third stretch has the same
+        number.
     """
     found = []
     for index, run in enumerate(nominal.problem.data.runs):
@@ -161,40 +163,40 @@ def turns_of(nominal: Fit, ids: Collection[str]) -> list[NDArray[np.int64]]:
 
 
 def predict_stretches(whole: Fit, turns: Turns) -> dict[str, Array]:
-    """Refit without each turn's stretches, and predict them. No parameter uses the held-out readings.
+    """Refit without the stretches of each number, and predict them. No parameter uses the held-out readings.
 
     Returns:
-        By id of the divided runs: reading minus prediction in noise standard deviations, every block predicted by
-        the fit that has not used it, unless that fit failed.
+        By id of the divided runs: reading minus prediction in noise standard deviations. Every block is
+            predicted by the fit that did not use it, unless that fit failed.
     """
     runs = whole.problem.data.runs
-    found = {
+    predicted = {
         run.id: r.copy() for run, r, turn in zip(runs, whole.residuals, turns, strict=True) if turn[0] >= 0
     }
-    for number in range(FOLDS if found else 0):
+    for number in range(FOLDS if predicted else 0):
         out = [turn == number for turn in turns]
         try:
-            _, residuals = fit_seen(whole, [~left for left in out])
+            _, residuals = fit_seen(whole, [~held_out for held_out in out])
         except np.linalg.LinAlgError:
             continue
-        for run, residual, left in zip(runs, residuals, out, strict=True):
-            if left.any():
-                found[run.id][left] = residual[left]
-    return found
+        for run, residual, held_out in zip(runs, residuals, out, strict=True):
+            if held_out.any():
+                predicted[run.id][held_out] = residual[held_out]
+    return predicted
 
 
 def share_ahead(study: Study, whole: Collection[str]) -> float | None:
     """Share of the gap in the later half of driven runs that the answer explains, fitted to the earlier half.
 
-    Stretches between fitted ones test interpolation only. The later half of a free decay has other amplitudes than
-    the earlier half; the input of a driven run has no such order.
+    Stretches between fitted ones test interpolation only. The input of a driven run has no order in amplitude.
+    In a free decay the later half has smaller amplitudes than the earlier one.
 
     Args:
         whole: ids of the runs that can be held out as a whole.
 
     Returns:
-        None where no driven run is held out in stretches, the later halves show no gap, or a random moment is part
-        of the answer, which nothing predicts.
+        None if no driven run is held out in stretches, if the later halves show no gap, or if the answer
+        includes a random moment, which cannot be predicted.
     """
     nominal, chosen = study.nominal, study.chosen
     runs = nominal.problem.data.runs
@@ -202,19 +204,19 @@ def share_ahead(study: Study, whole: Collection[str]) -> float | None:
     ahead = [run.id in driven.difference(whole) for run in runs]
     if not study.named or study.moment is not None or chosen is nominal or not any(ahead):
         return None
-    seen = [
+    earlier = [
         np.arange(run.reading.size) < (run.reading.size // 2 if later else run.reading.size)
         for run, later in zip(runs, ahead, strict=True)
     ]
-    left = []
+    predicted = []
     for fitted in (nominal, chosen):
         try:
-            _, residuals = fit_seen(fitted, seen)
+            _, residuals = fit_seen(fitted, earlier)
         except np.linalg.LinAlgError:
             return None if fitted is nominal else 0.0
-        left.append(np.concatenate([r[~known] for r, known in zip(residuals, seen, strict=True)]))
-    before, after = (float(np.mean(one**2)) for one in left)
-    if chdtrc(left[0].size, left[0].size * before) >= study.settings.answer.remains_rate:
+        predicted.append(np.concatenate([r[~known] for r, known in zip(residuals, earlier, strict=True)]))
+    before, after = (float(np.mean(one**2)) for one in predicted)
+    if chdtrc(predicted[0].size, predicted[0].size * before) >= study.settings.answer.remains_rate:
         return None
     return share_closed(before - 1.0, after - 1.0) if np.isfinite(after) else 0.0
 
@@ -224,9 +226,9 @@ class Base:
     """The reference noise of an excess.
 
     Args:
-        variance: of one sample, rad²: noise and stated resolution.
-        extra: share that a coarse step adds to it.
-        hum: share that a hum adds to it.
+        variance: variance of one sample's noise with the stated resolution, rad².
+        extra: variance that a coarse step adds, as a share of this variance.
+        hum: variance that a hum adds, as a share of this variance.
     """
 
     variance: float
@@ -238,7 +240,7 @@ def excess_base(study: Study) -> Base:
     """The noise that would remain with a perfect model.
 
     Returns:
-        The stated noise, where the records or the step of the readings contradict it; else the noise estimated
+        The stated noise, if the records or the step of the readings contradict it; else the noise estimated
         from the records.
     """
     estimated = float(np.mean(list(study.prepared.noise.variance.values())))
@@ -253,19 +255,19 @@ def excess_base(study: Study) -> Base:
     return Base(estimated, 0.0, hum)
 
 
-_ITERATIONS = 6  # the fit of all causes is close for the other parameters
-_NO_GAIN = 0.999  # share of the χ² of fewer causes above which another start is tried
+_ITERATIONS = 6  # the fit of all causes is close in the other parameters
+_NO_GAIN = 0.999  # ratio to the χ² of fewer causes above which another start is tried
 
 Names = frozenset[str]
 
 
 class Subsets:
-    """Fits by the set of causes in them, each made once."""
+    """Fits by the set of their causes, each made once."""
 
     def __init__(self, study: Study) -> None:
         self._study = study
         self.causes: Names = frozenset(kind.name for kind in study.chosen.problem.effects)
-        # with fewer causes the runs differ by chance as much as with all of them
+        # with fewer causes the scatter of the runs stays as it is with all of them
         none = with_scatter(study.nominal, study.chosen.problem.scatter)
         self._fits: dict[Names, Fit] = {self.causes: study.chosen, frozenset(): none}
 
@@ -273,7 +275,7 @@ class Subsets:
         """The best fit found with these causes.
 
         Returns:
-            The study's own fit, or one started from the fit of all causes. Where a fit of fewer causes is better,
+            The study's own fit, or one started from the fit of all causes. If a fit of fewer causes is better,
             the missing cause is added to it; a cause without gain leaves the fit unchanged.
         """
         key = frozenset(names)
@@ -283,24 +285,24 @@ class Subsets:
             own = None if answer is None or answer.moment is not None else answer.hypothesis
             if own is None:
                 start = restricted(self._study.chosen, key)
-                found = try_fit(
+                refitted = try_fit(
                     start.problem, start.point, base=start, tolerance=1e-3, max_iterations=_ITERATIONS
                 )
-                found = _finite(found)
+                refitted = _finite(refitted)
             else:
-                found = own.fit
-            if found is None or found.total > _NO_GAIN * known.total:
+                refitted = own.fit
+            if refitted is None or refitted.total > _NO_GAIN * known.total:
                 added: Fit | None = known
                 for kind in self._study.chosen.problem.effects:
                     if kind.name in key - fewer and added is not None:
                         added = one_more(added, kind)
-                found = added or found
-            self._fits[key] = known if found is None or found.total > known.total else found
+                refitted = added or refitted
+            self._fits[key] = known if refitted is None or refitted.total > known.total else refitted
         return self._fits[key]
 
 
 def one_more(base: Fit, kind: type[Effect]) -> Fit | None:
-    """A fit with one more effect, the better from its first two starting points; None where both fail."""
+    """A fit with one more effect, from the better of its first two starting points; None where both fail."""
     tried = (_finite(try_fit(start.problem, start.point)) for start in starting_points(base, kind)[:2])
     return min((found for found in tried if found), key=lambda found: found.total, default=None)
 
@@ -310,10 +312,10 @@ def _finite(found: Fit | None) -> Fit | None:
 
 
 def waterfall(study: Study, base: Base) -> Waterfall:
-    """Add the causes one after another in their best order, and remove each alone from the whole.
+    """Add the causes one after another in their best order, and remove each alone from the full set.
 
-    The excesses come from the fits' own integrator. The order is greedy: each next cause is the one that explains
-    most of the fitted readings. A random moment comes last, since it absorbs the other causes.
+    The excesses come from the fits' own integrator. The order is greedy: the next cause is always the one that
+    explains most of the fitted readings. A random moment comes last, since it absorbs the other causes.
     """
     models = _Models(study, base)
     names: Names = frozenset()
@@ -332,7 +334,7 @@ def waterfall(study: Study, base: Base) -> Waterfall:
     else:
         last = models.random_excess(moment)
         without = {name: last + size for name, size in models.read_off.items()}
-        acting = [kind.name for kind in moment.kinds]  # a cause may act steadily too, and be among the steps
+        acting = [kind.name for kind in moment.kinds]  # a cause may also act steadily, and be among the steps
         words = " + ".join([name for name in acting if name not in names] or acting)
         without[words] = steps[-1].excess
         steps.append(Step(words, last))
@@ -340,7 +342,7 @@ def waterfall(study: Study, base: Base) -> Waterfall:
 
 
 def both_ends(study: Study, base: Base) -> Waterfall:
-    """The first and the last step only: the nominal model, and all causes together."""
+    """Only the first and the last step: the nominal model, and all causes together."""
     models = _Models(study, base)
     names = sorted({*models.causes, *study.scattering})
     last = Step(" + ".join(names), models.excess(models.causes))
@@ -353,8 +355,9 @@ class _Models:
     def __init__(self, study: Study, base: Base) -> None:
         self._study, self._base = study, base
         powers = {HUM.name: base.hum, COARSE_STEP.name: base.extra}
-        self.read_off = {name: powers[name] for name in study.read_off if study.named}  # contributions
-        self._ratio = 1.0 + base.extra  # estimated noise over the base
+        # contributions of the causes detected in the records
+        self.read_off = {name: powers[name] for name in study.read_off if study.named}
+        self._ratio = 1.0 + base.extra  # estimated noise over the reference noise
         self._always = base.hum + base.extra - sum(self.read_off.values())
         self._fit = Subsets(study)
         self.causes: Names = self._fit.causes | self.read_off.keys()
@@ -372,7 +375,7 @@ class _Models:
         return ON_STRETCHES if runs == 0 else ON_BOTH
 
     def first_steps(self) -> list[Step]:
-        """The nominal model, and its residual gap where the runs differ by chance, if they do."""
+        """The nominal model, and, if the runs differ by chance, the residual gap with their chance differences."""
         none: Names = frozenset()
         steps = [Step(None, self._excess_of(self._study.nominal) + self._left(none))]
         if self._study.scattering:
@@ -380,7 +383,7 @@ class _Models:
         return steps
 
     def repeating(self) -> float:
-        """Residual gap of the causes where the runs repeat exactly, in noise variances of a sample."""
+        """Residual gap of the causes in runs that repeat exactly, in noise variances of a sample."""
         problem, point = without_deviations(self._study.chosen)
         fitted = _finite(try_fit(problem, point)) or self._study.nominal
         return self._excess_of(fitted) + self._left(self.causes)
@@ -411,21 +414,21 @@ class _Models:
         return self._weighted(by_run) + self._left(self.causes)
 
     def _left(self, names: Names) -> float:
-        """Excess added by the causes detected in the records that are not among the names."""
+        """Excess of the causes detected in the records that are not among the names."""
         return self._always + sum(size for name, size in self.read_off.items() if name not in names)
 
     def _predicted(self, fitted: Fit) -> dict[str, Array]:
         seen = dict(zip(self._ids, fitted.residuals, strict=True))
         found = seen | predict_held_out(fitted).residuals | predict_stretches(fitted, self._turns)
         still = {run.id: run.scaled(run.reading) for run in fitted.problem.data.runs}
-        # a prediction that diverges counts as no prediction
+        # a diverging prediction counts as no prediction
         return {run: r if np.all(np.isfinite(r)) else still[run] for run, r in found.items()}
 
     def _in_samples(self, residuals: Mapping[str, Array]) -> float:
         return self._weighted({run: float(np.mean(r**2)) - 1.0 for run, r in residuals.items()})
 
     def _weighted(self, excess: Mapping[str, float]) -> float:
-        """Mean over the runs' samples of an excess given in block means, in noise variances of a sample."""
+        """Mean over the runs' samples of an excess in block means, in noise variances of a sample."""
         runs = self._study.nominal.problem.data.runs
         sizes = np.array([run.reading.size * run.block for run in runs], np.float64)
         own = np.array([excess[run.id] / run.block for run in runs])

@@ -24,25 +24,26 @@ SMALL_CAUSES: Final = 3
 """Maximum number of unnamed small causes considered together, in effects. Judgement (decision 0028). Time
 against coverage."""
 SMALL_CAUSES_TRIED: Final = 8
-"""Number of effects in the sets of small causes: the ones that lower χ² most individually. Judgement (decision
+"""Number of effects in the sets of small causes: those with the greatest drop of χ² each. Judgement (decision
 0028). Time against coverage."""
 MISFIT_DEGREES: Final = 6.0
 """Effective degrees of freedom of the error of a real model. Judgement (decision 0028). One for every channel
 of the residuals."""
 DISPERSION_STDS: Final = 2.0
-"""Margin of χ² of the campaign over its expectation that counts as chance, where the misfit is treated as
-noise, in standard deviations. Convention."""
+"""Margin of the campaign's χ² over its expectation that counts as chance when the misfit is treated as noise,
+in standard deviations. Convention."""
 SCATTER_STDS: Final = 2.0
-"""Margin of χ² of the campaign over its expectation that counts as chance, for the scatter of the runs, in
+"""Margin of the campaign's χ² over its expectation that counts as chance for the scatter of the runs, in
 standard deviations. Convention."""
 MOVE_STDS: Final = 2.0
 """Maximum chance difference between the two halves of the data, in standard deviations. Convention."""
 LEAST_HALF: Final = 0.1
 """Minimum share of the information on a coefficient in each half of the data. Judgement."""
 
-_DISTINCT = 1e-3  # least eigenvalue of the correlation matrix of a set's changes
-_SECANTS, _SETTLED = 4, 0.25  # times a size is changed, and the share by which it then changes no more
-_OWN_SIZE = 3.0  # factor by which linear theory may change a size found in the records' lines
+_DISTINCT = 1e-3  # minimum eigenvalue of the correlation matrix of a set's changes
+# number of changes of a size, and the relative change below which the size has settled
+_SECANTS, _SETTLED = 4, 0.25
+_OWN_SIZE = 3.0  # factor by which linear theory may change a size taken from lines of the records
 
 
 def wind_on_runs(fit: Fit) -> list[WindOnRun]:
@@ -67,7 +68,7 @@ def coefficients_of(fit: Fit) -> tuple[str, ...]:
 
 
 def coefficient_move(fit: Fit, name: str) -> float:
-    """The move (`move_of_halves`) of a coefficient, in its unit."""
+    """The move of a coefficient (`move_of_halves`), in its unit."""
     return move_of_halves(fit, fit.problem.data.model.gradient(fit.problem.names, fit.point.common, name))
 
 
@@ -75,24 +76,24 @@ def parameter_shift(fit: Fit, shifts: Sequence[Array]) -> Array:
     """The change of the common parameters by a change of the readings, shape (common,), in their units.
 
     Args:
-        shifts: of the readings, in noise standard deviations, by run, shape (n,).
+        shifts: changes of the readings, in noise standard deviations, by run, shape (n,).
     """
     _, slope, _ = normal_equations(fit.jacobian, list(shifts), products=fit.products)
     return np.asarray(fit.covariance @ slope, np.float64)
 
 
 def move_of_halves(fit: Fit, gradient: Array) -> float:
-    """Half the difference between a quantity from two halves of the data, beyond chance.
+    """Half the difference between a quantity's values from two halves of the data, beyond chance.
 
     Args:
-        gradient: of the quantity to the common parameters, shape (common,).
+        gradient: derivatives of the quantity by the common parameters, shape (common,).
 
-    The data are halved by amplitude, by time, by wind speed and by spring, and the halves that differ most count.
-    The difference comes from one Gauss–Newton step of the fit: the scores of a fit sum to zero, so the two
-    halves pull in opposite directions. If the model were right, the pull would be due to noise alone. This is the
-    test of Zeileis & Hornik (Stat. Neerl. 61 (2007) 488) for parameters that change along an ordering, in the
-    parameter's unit. Refitting each half would give the same answer, but is undetermined where one half shows only
-    some causes.
+    The data are halved by amplitude, by time, by wind speed and by spring; the division with the largest
+    difference counts. The difference comes from one Gauss–Newton step of the fit: the scores of a fit sum to
+    zero, so the two halves pull in opposite directions. If the model were right, the pull would be due to noise
+    alone. This is the test of Zeileis & Hornik (Stat. Neerl. 61 (2007) 488) for parameters that change along an
+    ordering, in the parameter's unit. Refitting each half would give the same answer, but a half may show only
+    some of the causes, which would leave the refit undetermined.
 
     Returns:
         The move in the quantity's unit, less the contribution of noise (2 standard deviations, in quadrature);
@@ -101,7 +102,7 @@ def move_of_halves(fit: Fit, gradient: Array) -> float:
     _, slope, solutions = normal_equations(fit.jacobian, fit.residuals, products=fit.products)
     # the remaining step of the fit itself
     direction, step = fit.covariance @ gradient, fit.covariance @ slope
-    rows: list[tuple[float, ...]] = []  # of pieces of one cycle
+    rows: list[tuple[float, ...]] = []  # one row for each piece of one cycle
     for index, (run, (common, release), residual, solution) in enumerate(
         zip(fit.problem.data.runs, fit.jacobian, fit.residuals, solutions, strict=True)
     ):
@@ -109,7 +110,7 @@ def move_of_halves(fit: Fit, gradient: Array) -> float:
         influence = left @ direction
         pull = influence * (residual - left @ step - release @ solution[:, -1])
         motion, count = np.abs(run.reading - np.mean(run.reading)), run.reading.size
-        cycles = resonance(fit, index) * run.interval  # to a block
+        cycles = resonance(fit, index) * run.interval  # cycles per block
         pieces = min(max(int(count * cycles), 1), count)
         starts = np.arange(pieces, dtype=np.int64) * count // pieces
         columns: Sequence[Array] = (
@@ -125,7 +126,7 @@ def move_of_halves(fit: Fit, gradient: Array) -> float:
         rank = np.argsort(order, kind="stable")
         at = int(np.searchsorted(np.cumsum(weight[rank]), 0.5 * total))
         middle = order[rank[min(at, rank.size - 1)]]
-        for low in (order < middle, order <= middle):  # runs of equal order are not divided
+        for low in (order < middle, order <= middle):  # runs of equal order stay together
             share = float(weight[low].sum()) / max(total, 1e-300)
             if LEAST_HALF < share < 1.0 - LEAST_HALF:  # else one half has no information
                 both = 2.0 * share * (1.0 - share)
@@ -140,13 +141,13 @@ class Beside:
     """A fit, and the fit with sets of small causes added, by linear theory.
 
     Args:
-        weights: probability of each set, the empty one first, shape (sets,).
+        weights: probability of each set, the empty set first, shape (sets,).
         moves: change of the nominal model's coefficients by each set, shape (sets, coefficients).
-        noise: variances due to the noise of the readings, of that shape.
-        forms: further variances due to the forms of the small causes, of that shape.
-        residuals: scaled, mean over the sets, by run.
-        scatter: standard deviations from the scatter of the runs in these residuals, where it exceeds chance,
-            shape (coefficients,); else 0.
+        noise: variances of the moves due to the noise of the readings, shape (sets, coefficients).
+        forms: further variances due to the forms of the small causes, shape (sets, coefficients).
+        residuals: scaled residuals, mean over the sets, by run.
+        scatter: standard deviations from the scatter of the runs in these residuals if it exceeds chance, else
+            0; shape (coefficients,).
     """
 
     weights: Array
@@ -159,15 +160,17 @@ class Beside:
 
 @dataclass(frozen=True, eq=False)
 class _Cause:
-    """One effect beside the fit, at the size at which its change was computed."""
+    """One effect beside the fit, with the size used to compute its change."""
 
     unabsorbed: Array  # the change of all readings that the fit cannot absorb, scaled, shape (n,)
-    moves: Array  # of the coefficients by the part that it absorbs, shape (coefficients,)
+    moves: Array  # changes of the coefficients by the absorbed part, shape (coefficients,)
     unseen: (
-        Array  # their standard deviations from the part of its form that no free decay shows, of that shape
+        # their standard deviations from the part of the effect's form that no free decay shows, shape
+        # (coefficients,)
+        Array
     )
-    least: float  # multiple of the size that is allowed
-    greatest: float  # multiple of the size that is allowed
+    least: float  # least allowed multiple of the size
+    greatest: float  # greatest allowed multiple of the size
     by_chance: float  # chance gain of χ² by parameters per run
 
 
@@ -176,10 +179,10 @@ class _Step:
     """A set of effects added by one Gauss–Newton step."""
 
     sizes: Array  # multiples of the causes' sizes, 0 outside the set, shape (causes,)
-    drop: float  # of χ², less what the runs' own numbers gain by chance
-    moves: Array  # of the coefficients, shape (coefficients,)
-    noise: Array  # variances of these due to the noise, of that shape
-    forms: Array  # variances of these due to the effects' forms, of that shape
+    drop: float  # drop of χ², less the gain by chance of the runs' own parameters
+    moves: Array  # changes of the coefficients, shape (coefficients,)
+    noise: Array  # variances of these due to the noise, shape (coefficients,)
+    forms: Array  # variances of these due to the effects' forms, shape (coefficients,)
 
 
 def alone(fit: Fit) -> Beside:
@@ -210,13 +213,13 @@ def beside(fit: Fit, starts: Starts) -> Beside:
     """Add sets of effects that a fit does not include, up to three at a time, by one Gauss–Newton step.
 
     An unnamed effect changes the coefficients, because the fit absorbs a part of it. The other part is in the
-    residuals and gives its size. A set has the weight exp(−(χ²/φ + price)/2), with the same price for each effect.
-    φ is the dispersion of the best set's residual beyond chance, over the six effective degrees of freedom of a
-    real model's error (decisions 0007 and 0028). An effect that the readings do not show therefore has no part in
-    the average, however far it could move a coefficient.
+    residuals and gives the effect's size. A set has the weight exp(−(χ²/φ + price)/2), with the same price for
+    each effect. φ is the dispersion of the best set's residual beyond chance, over the six effective degrees of
+    freedom of a real model's error (decisions 0007 and 0028). An effect that the readings do not show therefore
+    has no part in the average, however far it could move a coefficient.
 
     Args:
-        fit: with or without effects.
+        fit: the fit of the answer, with or without effects.
         starts: the effects that may act beside the fitted ones.
     """
     gradients, settings = coefficient_gradients(fit), fit.settings.answer
@@ -224,9 +227,9 @@ def beside(fit: Fit, starts: Starts) -> Beside:
     causes, residuals = [], np.concatenate(fit.residuals)
     for _, points in starts:
         with suppress(np.linalg.LinAlgError):
-            start = next(iter(points), None)  # the most promising one
+            start = next(iter(points), None)  # the most promising starting point
             cause = None if start is None else _cause(fit, start, influence)
-            # not every effect is linear in its size, so each is evaluated near the size of its own step
+            # some effects are not linear in their size, so each is evaluated near the size of its own step
             for _ in range(_SECANTS):
                 if start is None or cause is None or start.scaled is None:
                     break
@@ -314,10 +317,10 @@ def _formal(fit: Fit, gradients: Array) -> Array:
 def _step(
     gram: Array, score: Array, causes: Sequence[_Cause], chosen: list[int], form_std: float
 ) -> _Step | None:
-    """Add the effects with some indices; None where they change the readings alike, or a size is out of range.
+    """Add the effects with some indices; None if they change the readings alike, or a size is out of range.
 
-    ``gram`` has the products of the causes' changes, shape (causes, causes), ``score`` with the residuals.
-    ``form_std`` is the standard deviation of a move due to the form, as a share of it.
+    ``gram`` has the products of the causes' changes, shape (causes, causes), and ``score`` their products with
+    the residuals. ``form_std`` is the standard deviation of a move due to the form, as a share of the move.
     """
     own = gram[np.ix_(chosen, chosen)]
     scale = np.sqrt(np.diag(own))
@@ -370,7 +373,7 @@ def _cause(fit: Fit, start: StartingPoint, influence: list[Array]) -> _Cause | N
     least, greatest = 0.0, 1.0
     if own:
         least, greatest = 1.0 / _OWN_SIZE, _OWN_SIZE
-    elif start.scaled is not None:  # its parameter's range
+    elif start.scaled is not None:  # range of the effect's parameter
         least, greatest = size_range(start)
     unseen = np.zeros(moves.size)
     if "cn_beta" in fit.problem.names:  # Cnβ and Cnr come last

@@ -27,8 +27,8 @@ from tunnel_sim.vocabulary.quantities import PerRun
 from tunnel_sim.vocabulary.record import Array
 
 LIMIT_TOLD: Final = 0.5
-"""Maximum ratio of the upper limit of a scatter that is not detected to its limit before any run, for the
-runs to say something about it. Judgement. Above it the limit is the prior's."""
+"""Maximum ratio of the upper limit of undetected scatter to its limit before any run, for the runs to count as
+evidence. Judgement. Above it the limit is the prior's."""
 
 
 @dataclass(frozen=True)
@@ -37,11 +37,11 @@ class Spread:
 
     Args:
         effect: name of the scatter.
-        width: standard deviation of the runs' relative deviations, the likeliest, dimensionless.
-        interval: its central interval of 0.90, dimensionless.
+        width: most likely standard deviation of the runs' relative deviations, dimensionless.
+        interval: central interval of 0.90 of the width, dimensionless.
         stated: value stated by the campaign, dimensionless; None: not stated.
-        shown: whether the runs show it beyond the stated value; it is then among the causes.
-        deviations: of every run that it acts on, by id, relative, dimensionless.
+        shown: whether the runs show more than the stated value; the scatter is then among the causes.
+        deviations: relative deviation of every run on which it acts, by id, dimensionless.
     """
 
     effect: str
@@ -57,13 +57,13 @@ class Trend:
     """A quantity that differs between the runs by a pattern: in their order, or with a condition of the plan.
 
     Args:
-        effect: name of the scatter of that quantity.
-        change: of the quantity from the first run to the last one, or from the least value of the condition to the
-            greatest, relative, dimensionless.
-        std: its standard deviation, dimensionless.
-        p_value: probability of such an order by chance, times the number of trends sought.
-        left: standard deviation of the runs' deviations from the drift, relative, dimensionless.
-        only: whether the runs show no scatter of the quantity beside the drift.
+        effect: name of the quantity's scatter.
+        change: relative change of the quantity from the first run to the last, or from the least value of the
+            condition to the greatest, dimensionless.
+        std: standard deviation of the change, dimensionless.
+        p_value: probability of such a pattern by chance, times the number of patterns tested.
+        left: standard deviation of the runs' deviations from the trend, relative, dimensionless.
+        only: whether the runs show no scatter of the quantity beside the trend.
         along: ``order``, ``spring_stiffness``, ``wind_speed``, ``air_density`` or ``amplitude``.
     """
 
@@ -81,14 +81,14 @@ class RunRepeat:
     """A run against the model of all runs.
 
     Args:
-        id: of the run.
+        id: id of the run.
         windy: whether the wind is on.
-        frequency_hz: of small swings, predicted without a deviation of the run, Hz.
-        damping_ratio: of small swings, predicted without a deviation of the run, dimensionless.
-        frequency: the run's own over the predicted one minus one, a fraction.
-        frequency_std: its standard deviation by the noise, a fraction.
+        frequency_hz: frequency of small swings, predicted without a deviation of the run, Hz.
+        damping_ratio: damping ratio of small swings, predicted without a deviation of the run, dimensionless.
+        frequency: the run's own frequency over the predicted one minus one, a fraction.
+        frequency_std: standard deviation of ``frequency`` due to the noise, a fraction.
         damping: the run's own damping ratio over the predicted one minus one, a fraction.
-        damping_std: its standard deviation by the noise, a fraction.
+        damping_std: standard deviation of ``damping`` due to the noise, a fraction.
         frequency_band: standard deviation of the frequency between runs, a fraction; 0 where they repeat.
         damping_band: standard deviation of the damping ratio between runs, a fraction.
         p_value: probability of such a deviation by chance, given the other runs, times the number of runs.
@@ -107,7 +107,7 @@ class RunRepeat:
     p_value: float
 
     def deviation(self, name: str) -> tuple[float, float, float]:
-        """The deviation of ``frequency`` or ``damping``, its deviation by noise, and its scatter between runs."""
+        """The deviation of ``frequency`` or ``damping``, its deviation by noise, and the scatter between runs."""
         if name == "frequency":
             return self.frequency, self.frequency_std, self.frequency_band
         return self.damping, self.damping_std, self.damping_band
@@ -115,12 +115,12 @@ class RunRepeat:
 
 @dataclass(frozen=True)
 class ScatterLimits:
-    """Upper limits of scatter that was not detected, under a model that explains the runs down to their noise.
+    """Upper limits of undetected scatter, under a model that explains the runs down to their noise.
 
     Args:
         frequency: greatest standard deviation of the frequency between runs, with probability 0.95, a fraction;
-            None where the runs would hide usual scatter.
-        damping: of the damping ratio, as ``frequency``.
+            None if the runs could hide usual scatter.
+        damping: the same limit for the damping ratio.
     """
 
     frequency: float | None
@@ -129,11 +129,11 @@ class ScatterLimits:
 
 _CENTRAL = (0.05, 0.5, 0.95)  # levels of the quantiles
 _AT_MOST = 0.95  # level of a limit
-_NUMBERS = 2  # by which a run may deviate: its frequency and its damping
-_FEWEST = 5  # fewest runs for an outlier or a drift
-_FEWEST_OF_PATTERN = 4  # fewest runs for a pattern of the plan
+_NUMBERS = 2  # number of a run's deviations: its frequency and its damping
+_FEWEST = 5  # minimum number of runs for an outlier or a drift
+_FEWEST_OF_PATTERN = 4  # minimum number of runs for a pattern of the plan
 _PATTERN = 0.05  # relative range of a condition that makes a pattern
-_OF_TREND = 2  # numbers of a straight line
+_OF_TREND = 2  # number of parameters of a straight line
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +143,7 @@ class RunDeviations:
     Args:
         fitted: the fit of the answer.
         scatter: all differences that the runs could show; the fitted ones have the fit's widths.
-        columns: of the fit with all of them.
+        columns: columns of the fit with all of these differences.
         kept: indices of the fit's own differences among them.
     """
 
@@ -154,7 +154,7 @@ class RunDeviations:
 
     @classmethod
     def of(cls, fitted: Fit) -> RunDeviations | None:
-        """The runs of a fit; None where none of their numbers may scatter, or a sensitivity is not finite."""
+        """The runs of a fit; None if none of their quantities may scatter, or a sensitivity is not finite."""
         own = {one.name: one for one in fitted.problem.scatter}
         able = may_scatter(ALL_EFFECTS, fitted.problem.data)
         if not able:
@@ -184,7 +184,7 @@ class RunDeviations:
 
     @property
     def alone(self) -> tuple[int, int]:
-        """Indices of the differences in a run's own stiffness and in its own damping."""
+        """Indices of the differences in a run's own stiffness and damping."""
         numbers = [one.kind.scatters for one in self.scatter]
         return numbers.index("spring_stiffness"), numbers.index("mechanical_damping")
 
@@ -209,8 +209,8 @@ class RunDeviations:
     def limits(self) -> ScatterLimits | None:
         """Limits of the scatter of frequency and damping; None where the fit has chance differences.
 
-        A limit is the quantile of the width given the runs. Where it is hardly below the quantile of the prior, the
-        runs say nothing about the scatter.
+        A limit is the quantile of the width given the runs. If it is hardly below the quantile of the prior,
+        the runs say nothing about the scatter.
         """
         if self.kept:
             return None
@@ -231,8 +231,8 @@ class RunDeviations:
     def trends(self) -> tuple[Trend, ...]:
         """Parameters that differ between the runs and follow their order, or a condition of the plan.
 
-        The drift is a further common parameter: a run's own stiffness and damping change in proportion to its
-        place in the campaign, or to the condition. Widths are fitted beside the drift.
+        The trend is a further common parameter: a run's own stiffness and damping change in proportion to its
+        place in the campaign, or to the condition. Widths are fitted together with the trend.
         """
         places = [place for place in self.kept if self.scatter[place].shown]
         rate = self.fitted.settings.scatter.trend_rate
@@ -260,14 +260,14 @@ class RunDeviations:
             values = np.array(given)
             has = (
                 acts & (values > 0.0) if name == "air_density" else acts
-            )  # without wind no density is stated
+            )  # without wind no air density is stated
             low, high = float(values[has].min(initial=np.inf)), float(values[has].max(initial=0.0))
             if high - low > _PATTERN * high:
                 found[name] = np.where(has, (values - low) / (high - low) - 0.5, 0.0)
         return found
 
     def _trend(self, place: int, along: str, values: PerRun | None, tried: int) -> Trend | None:
-        """The drift of one parameter; None where too few runs have it."""
+        """The trend of one parameter; None where too few runs have it."""
         kind = self.scatter[place].kind
         count = int(self.fitted.problem.data.acts(kind).sum())
         if count < (_FEWEST if values is None else _FEWEST_OF_PATTERN):

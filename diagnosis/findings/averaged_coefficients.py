@@ -38,10 +38,10 @@ from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
 
 SKEWED_FROM: Final = 0.1
-"""Deviation of the ends of the interval from a normal distribution's ends above which the interval is
-stated, in standard deviations. Judgement."""
+"""Least deviation of an interval's ends from a normal distribution's ends for the interval to be stated, in
+standard deviations. Judgement."""
 SMALL_CAUSES_FROM: Final = 0.05
-"""Minimum probability of an answer for small causes beside it. Judgement."""
+"""Minimum probability of an answer for small causes to be considered beside it. Judgement."""
 
 _REACH = 8.5  # standard deviations beyond which a normal distribution has no probability in 64 bits
 _MOST_STEPS = 500
@@ -77,7 +77,7 @@ class NormalMixture:
         return math.sqrt(float(self.weights @ self.variances) + self.between)
 
     def mean_between(self, low: float, high: float) -> float:
-        """Mean of the part between two values, in the quantity's unit."""
+        """Mean of the part of the mixture between two values, in the quantity's unit."""
         stds = np.maximum(np.sqrt(self.variances), 1e-300)
         ends = [(end - self.means) / stds for end in (low, high)]
         inside = self.weights * (ndtr(ends[1]) - ndtr(ends[0]))
@@ -93,7 +93,8 @@ class NormalMixture:
         """
         stds = np.sqrt(self.variances)
         low, high = float(np.min(self.means - _REACH * stds)), float(np.max(self.means + _REACH * stds))
-        low, high = np.nextafter(low, -np.inf), np.nextafter(high, np.inf)  # a value may be certain
+        # a probability of 0 or 1: the value is certain
+        low, high = np.nextafter(low, -np.inf), np.nextafter(high, np.inf)
         widths = np.maximum(stds, 1e-300)
         precision = max(1e-16 * (high - low), 1e-300)
 
@@ -115,7 +116,7 @@ class Possible:
     Args:
         probability: of the answer, a fraction; over all answers they need not sum to 1.
         textbook: the same effects in textbook form, where the fit freed their forms.
-        small: the small causes that may act beside them; None: neither these nor a misfit are considered.
+        small: the small causes that may act beside the answer; None: neither they nor a misfit are considered.
     """
 
     probability: float
@@ -173,7 +174,7 @@ def possible_answers(study: Study, kinds: Sequence[type[Effect]]) -> Answers:
 def _by_choice(
     answer: Answer, fit: Fit, probability: float, kinds: Sequence[type[Effect]]
 ) -> tuple[float, list[Possible]]:
-    """The fit's share among the choices of an answer that the runs cannot exclude, and the other choices."""
+    """The share of the fit among the choices that the runs cannot exclude, and the other choices."""
     share, others = 1.0, []
     for choice in answer.choices:
         if choice.hypothesis.fit is fit:
@@ -191,14 +192,14 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, Quantity]:
         campaign: gives the digits to which the air density is stated.
 
     Returns:
-        By the names of the nominal model's coefficients; ``omega_n`` and ``zeta`` hold for small swings. Their
-        distribution is a mixture over the answers and over the sets of small causes beside them
+        The coefficients, by their names in the nominal model; ``omega_n`` and ``zeta`` hold for small swings.
+        Their distribution is a mixture over the answers and over the sets of small causes beside them
         (`diagnosis.answer.linear_theory`), with their probabilities; value and deviation describe its centre
         (`Central`).
 
         The variance within an answer is the sum of
 
-        - the fit's own;
+        - the variance of the fit;
         - the scatter of the runs where it exceeds chance, or half the difference between two halves of the data
           (`coefficient_move`) if that is greater;
         - the rounding of the air density;
@@ -234,31 +235,31 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, Quantity]:
     return estimates
 
 
-def correlation(answers: Answers, found: Mapping[str, Quantity]) -> tuple[tuple[float, ...], ...]:
+def correlation(answers: Answers, averaged: Mapping[str, Quantity]) -> tuple[tuple[float, ...], ...]:
     """The correlation of the coefficients by noise, small causes and rivals; see `Coefficients`.
 
     Args:
-        found: the coefficients averaged over the answers.
+        averaged: the coefficients averaged over the answers.
 
     Returns:
         In the order of the coefficients, shape (n, n).
     """
-    weights, means, noise = [], [], np.zeros((len(found), len(found)))
-    for one in answers.possible:
-        values, known = [_value(one.fit, name) for name in found], coefficients_of(one.fit)
-        if one.probability <= 0.0 or None in values:
+    weights, means, noise = [], [], np.zeros((len(averaged), len(averaged)))
+    for answer in answers.possible:
+        values, known = [_value(answer.fit, name) for name in averaged], coefficients_of(answer.fit)
+        if answer.probability <= 0.0 or None in values:
             continue
-        small, places = one.small or alone(one.fit), [known.index(name) for name in found]
-        gradients = coefficient_gradients(one.fit)[places]
-        noise += one.probability * gradients @ one.fit.stated_covariance @ gradients.T
-        weights.append(one.probability * small.weights)
+        small, places = answer.small or alone(answer.fit), [known.index(name) for name in averaged]
+        gradients = coefficient_gradients(answer.fit)[places]
+        noise += answer.probability * gradients @ answer.fit.stated_covariance @ gradients.T
+        weights.append(answer.probability * small.weights)
         means.append(np.array(values) + small.moves[:, places])
     if not means:
         return ()
     weight, mean = np.concatenate(weights), np.concatenate(means)
     away = mean - weight @ mean / weight.sum()
     shared = (noise + (away.T * weight) @ away) / weight.sum()
-    whole = np.maximum([(one.std or 0.0) ** 2 for one in found.values()], np.diag(shared))
+    whole = np.maximum([(quantity.std or 0.0) ** 2 for quantity in averaged.values()], np.diag(shared))
     scale = np.sqrt(np.maximum(whole, 1e-300))
     shared = shared / np.outer(scale, scale)
     np.fill_diagonal(shared, 1.0)
@@ -266,16 +267,16 @@ def correlation(answers: Answers, found: Mapping[str, Quantity]) -> tuple[tuple[
 
 
 def as_identified(
-    found: Mapping[str, Quantity], estimate: Estimate, campaign: Campaign, similarity: Similarity
+    averaged: Mapping[str, Quantity], estimate: Estimate, campaign: Campaign, similarity: Similarity
 ) -> dict[str, Quantity]:
     """The coefficients with the values and deviations of an estimate of the same runs, in the similar campaign.
 
     Without a cause both fit the same model to the same readings, so there is one number for each coefficient. A
-    coefficient that the estimate does not state is unchanged; ωn and ζ come from the only run.
+    coefficient that the estimate does not state is unchanged; ωn and ζ come from a campaign of one run.
     """
     runs = estimate.runs if len(estimate.runs) == 1 else ()
-    repeatability, same = estimate.repeatability, dict(found)
-    for name in found:
+    repeatability, same = estimate.repeatability, dict(averaged)
+    for name in averaged:
         given = next((one for of in (estimate, *runs) if (one := getattr(of, name, None)) is not None), None)
         if not isinstance(given, Quantity) or given.known_std <= 0.0:
             continue
@@ -300,8 +301,8 @@ _STEP = 1e-3  # of a parameter, in standard deviations, for the derivatives of t
 def in_phase(fit: Fit) -> tuple[dict[str, Quantity], tuple[tuple[float, ...], ...]]:
     """Cnβ and Cnr in phase with angle and rate (decision 0004), and the covariance of all four coefficients.
 
-    The part of an effect's form that no free decay shows moves Cnr along the effect's own part, so it adds nothing
-    to the coefficients in phase.
+    No free decay shows one part of an effect's form. That part moves Cnr along the effect's contribution in
+    phase, so it adds nothing to the coefficients in phase.
 
     Returns:
         By name, and the covariance of Cnβ and Cnr of the fitted law and of both in phase, shape (4, 4); both empty
@@ -341,15 +342,16 @@ def in_phase(fit: Fit) -> tuple[dict[str, Quantity], tuple[tuple[float, ...], ..
 
 @dataclass(frozen=True)
 class Central:
-    """The centre of a mixture.
+    """The centre of a mixture, and its spread about it.
 
-    An improbable rival with a distant mean may contribute most of a variance, and move the mean by more than the
-    deviation of the answer. The central interval holds it only as far as its probability reaches.
+    An improbable rival with a distant mean may contribute most of the variance, and move the mean by more than
+    the deviation of the answer. The central interval contains the rival only if its probability is large
+    enough.
 
     Args:
         value: mean of the part within the central interval.
-        std: half the length of the central interval, over the same half of a standard normal distribution.
-        interval: the ends of the interval where it is not the one of a normal distribution; else None.
+        std: half the length of the central interval, over a standard normal distribution's half length.
+        interval: the ends of the interval where it differs from a normal distribution's; else None.
     """
 
     value: float
@@ -372,10 +374,9 @@ def before_the_causes(nominal: Fit, after: Mapping[str, Quantity]) -> dict[str, 
     """The coefficients of the nominal model.
 
     Args:
-        after: the averages over the answers; their squared difference from the nominal ones is added to the
-            variance.
+        after: the averages over the answers; the squared difference from them is added to the variance.
     """
-    found = {}
+    before = {}
     for place, name in enumerate(coefficients_of(nominal)):
         value, given = _value(nominal, name), after.get(name)
         if value is None or given is None:
@@ -385,14 +386,14 @@ def before_the_causes(nominal: Fit, after: Mapping[str, Quantity]) -> dict[str, 
             parts["noise"] = float(alone(nominal).noise[0, place])
         else:
             parts |= {source: share * given.std**2 for source, share in given.shares.items()}
-        found[name] = _estimate(nominal, name, value, math.sqrt(sum(parts.values())), parts)
-    return found
+        before[name] = _estimate(nominal, name, value, math.sqrt(sum(parts.values())), parts)
+    return before
 
 
 def _budget(parts: Mapping[str, float], variance: float) -> dict[str, float]:
     """Variances by source: the sources within the answer, and the rest from the other answers.
 
-    The answer's own are scaled where another answer narrows the interval.
+    The answer's own variances are scaled where another answer narrows the interval.
     """
     within = sum(parts.values())
     scale = min(1.0, variance / within) if within > 0.0 else 0.0
@@ -427,15 +428,17 @@ def _of_answer(
         "freed form": 0.0 if unfreed is None else (form_std * (value - unfreed)) ** 2,
     }
     noise, forms = small.noise[:, place], small.forms[:, place]
-    found = NormalMixture(small.weights, value + small.moves[:, place], noise + forms + sum(common.values()))
+    mixture = NormalMixture(
+        small.weights, value + small.moves[:, place], noise + forms + sum(common.values())
+    )
     formal = float(small.weights @ noise)
     by_scatter = _by_scatter(fit, place) * formal
     within = {
         "noise": formal - by_scatter,
         "scatter": by_scatter,
-        "small causes": float(small.weights @ forms) + found.between,
+        "small causes": float(small.weights @ forms) + mixture.between,
     }
-    return answer.probability, found, within | common
+    return answer.probability, mixture, within | common
 
 
 def _by_scatter(fit: Fit, place: int) -> float:

@@ -1,7 +1,7 @@
 """Whether the runs agree on the size of a cause: its size in every run beside the common one.
 
-A law that holds gives the same size in every run. A size that differs from run to run by more than its errors
-belongs to another law, or to a run that differs from the others.
+A correct law gives the same size in every run. If the size differs from run to run by more than its errors, the
+law is wrong, or one run differs from the others.
 """
 
 from __future__ import annotations
@@ -44,16 +44,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 AGREE_RATE: Final = 0.001
-"""Rate at which runs of one size of a cause are said to differ in it. Convention. One cause in 1000."""
+"""False-alarm rate of the test that the runs agree on the size of a cause. Convention. One cause in 1000."""
 SHOWN_SIZE: Final = 1.0
 """Maximum standard deviation of a size in one run, as a share of the common size, for the run to show it.
 Convention. A wider interval says nothing."""
 OWN_SHARE: Final = 0.001
-"""Minimum share of a run's information on a size that remains beside its own spring and damping, in the median
-run, for runs to show the size by themselves. Judgement. An offset of the wind speed keeps none of it, and dry
-friction in a short run 0.005."""
+"""Minimum share of a run's information on a size that is independent of its spring and damping, in the median
+run, for runs to show the size by themselves. Judgement. The share is 0 for an offset of the wind speed, and
+0.005 for dry friction in a short run."""
 
-_ACTS = 1e-9  # share of the information of all runs that a run has at least where the cause acts in it
+_ACTS = 1e-9  # minimum information of a run, as a share of all runs', for the cause to act in it
 
 
 @dataclass(frozen=True)
@@ -61,13 +61,14 @@ class SizeByRun:
     """The size of a cause in every run.
 
     Args:
-        effect: its name.
+        effect: name of the effect.
         parameter: name of its severity.
-        common: fitted to all runs.
-        runs: by id, from the readings of one run; without the runs that cannot show it.
-        silent: ids of the runs in which it acts, and which cannot show it.
-        alone: whether stiffness and damping are free in each run; else all other parameters are those of all runs.
-        p_value: probability of sizes that differ so much, if there is one size.
+        common: the size fitted to all runs.
+        runs: the size by run id, from the readings of one run; without the runs that cannot show it.
+        silent: ids of the runs in which the cause acts without showing its size.
+        alone: whether stiffness and damping are free in each run; else all other parameters are common to the
+            runs.
+        p_value: probability of such differences between the sizes, if there is one size.
         spread: standard deviation of the sizes beyond their errors, as a share of the common size.
     """
 
@@ -87,25 +88,27 @@ class SizeByRun:
 
     @property
     def farthest(self) -> str:
-        """The run whose size is most standard deviations from the common one."""
-        away = {name: abs(one.value - self.common.value) / one.known_std for name, one in self.runs.items()}
+        """The run with the size farthest from the common one, in standard deviations."""
+        away = {
+            name: abs(size.value - self.common.value) / size.known_std for name, size in self.runs.items()
+        }
         return max(away, key=away.__getitem__)
 
     @property
     def words(self) -> str:
         """Whether the runs agree on it, in sentences."""
         size, number = self.common, counted(len(self.runs), "run")
-        said = f"{sentence_case(plain(self.effect))}: {for_people(size.value, size.std, size.unit)} in all runs. "
+        text = f"{sentence_case(plain(self.effect))}: {for_people(size.value, size.std, size.unit)} in all runs. "
         if self.agrees:
-            said += f"The {number} that show it agree (p {p_text(self.p_value)})."
+            text += f"The {number} that show it agree (p {p_text(self.p_value)})."
         else:
-            said += (
+            text += (
                 f"The {number} that show it differ by {percent_of(self.spread)} beyond their errors "
                 f"(p {p_text(self.p_value)}), {self.farthest} the most: its law has another form, or a run is odd."
             )
         if self.silent:
-            said += f" {sentence_case(counted(len(self.silent), 'run'))} cannot show it."
-        return said
+            text += f" {sentence_case(counted(len(self.silent), 'run'))} cannot show it."
+        return text
 
 
 @dataclass(frozen=True)
@@ -113,7 +116,7 @@ class CausesByRun(Finding):
     """The size of every fitted cause in every run.
 
     Args:
-        causes: of which two runs at least show the size.
+        causes: the causes with a size that at least two runs show.
     """
 
     after: ClassVar[str] = "found"
@@ -130,48 +133,50 @@ class CausesByRun(Finding):
         units = _units(study.chosen)
         free = {name: Quantity(study.chosen.value(name), None, units[name]) for name in units}
 
-        def own(one: SizeByRun, given: Quantity) -> Quantity:
-            name = f"{one.effect}.{one.parameter}"  # its unit depends on the exponents beside it
+        def own(cause: SizeByRun, given: Quantity) -> Quantity:
+            name = f"{cause.effect}.{cause.parameter}"  # the unit of the information depends on the exponents
             return own_parameters({**free, name: given}, answered.campaign, study.similarity, study.model)[
                 name
             ]
 
-        found = tuple(
+        causes = tuple(
             replace(
-                one, common=own(one, one.common), runs={run: own(one, of) for run, of in one.runs.items()}
+                cause,
+                common=own(cause, cause.common),
+                runs={run: own(cause, of) for run, of in cause.runs.items()},
             )
-            for one in sizes(study.chosen, study.prepared.kinds)
+            for cause in sizes(study.chosen, study.prepared.kinds)
         )
-        return cls(found) if found else None
+        return cls(causes) if causes else None
 
     def section(self, judged: Judged) -> Section:
         """The causes on which the runs differ, the figure, and in detail the others with the table."""
-        heads = tuple(f"{plain(one.effect)} [{unit_mark(one.common.unit)}]" for one in self.causes)
-        ids = dict.fromkeys(name for one in self.causes for name in one.runs)
-        rows = tuple((name, *(_shown(one.runs.get(name)) for one in self.causes)) for name in ids)
+        heads = tuple(f"{plain(cause.effect)} [{unit_mark(cause.common.unit)}]" for cause in self.causes)
+        ids = dict.fromkeys(name for cause in self.causes for name in cause.runs)
+        rows = tuple((name, *(_shown(cause.runs.get(name)) for cause in self.causes)) for name in ids)
         table = TextTable("Size of each cause in every run, ± one standard deviation", ("run", *heads), rows,
                           right=heads)  # fmt: skip
         agree, differ = (
-            tuple(Paragraph(one.words, "Run by run") for one in self.causes if one.agrees is agrees)
+            tuple(Paragraph(cause.words, "Run by run") for cause in self.causes if cause.agrees is agrees)
             for agrees in (True, False)
         )
-        drawn = (one.block for one in self.pictures(judged))
+        drawn = (picture.block for picture in self.pictures(judged))
         detail = Detail((*agree, table, Paragraph(self._how, kind="small")))
         return Section("by-run", "Whether the runs agree", (*differ, *drawn, detail))
 
     @property
     def _how(self) -> str:
-        """How the sizes are found, by the causes that it is true of."""
+        """How the sizes are computed, with the causes to which each method applies."""
         ways = {
             True: "fitted to each run with a stiffness and a damping of its own",
             False: "the size that suits one run, with every other number as in all runs",
         }
-        said = []
+        clauses = []
         for alone, way in ways.items():
-            names = [one.effect for one in self.causes if one.alone is alone]
+            names = [cause.effect for cause in self.causes if cause.alone is alone]
             if names:
-                said.append(f"{plain(*names)}: {way}")
-        return f"{sentence_case('; '.join(said))}."
+                clauses.append(f"{plain(*names)}: {way}")
+        return f"{sentence_case('; '.join(clauses))}."
 
     def pictures(self, judged: Judged) -> tuple[Picture, ...]:
         """The size of each cause by run, a panel each."""
@@ -194,16 +199,16 @@ def _units(fit: Fit) -> dict[str, str]:
 def sizes(fit: Fit, kinds: Sequence[type[Effect]]) -> Iterator[SizeByRun]:
     """The size of each effect in every run, by a Gauss–Newton step from a fit to all runs.
 
-    "The size in a run" has two readings. Where single runs show an effect, stiffness and damping are free in each
-    run. Where only the comparison of runs shows it, every other number is that of all runs.
+    "The size in a run" has two meanings. Where single runs show an effect, stiffness and damping are free in
+    each run. Where only the comparison of runs shows it, all other parameters are common to the runs.
 
     Args:
         kinds: the effects that may be named.
 
     Returns:
-        Of effects whose severity is inside its bounds, and which two runs at least show. The errors include the
-        misfit of the run. The test of one size is Cochran's Q, and its spread the moment estimate of DerSimonian
-        and Laird, Controlled Clinical Trials 7 (1986) 177.
+        Sizes of the effects with a severity inside its bounds that at least two runs show. The errors include
+        the misfit of the run. Cochran's Q tests whether the sizes are equal; their spread is the moment
+        estimate of DerSimonian and Laird, Controlled Clinical Trials 7 (1986) 177.
     """
     names, (held, slopes) = fit.problem.names, _by_run(fit.problem, fit.point, fit.residuals, fit.jacobian)
     free, free_slopes = _beside_own_terms(fit, kinds) or (np.zeros_like(held), slopes)
@@ -231,7 +236,7 @@ def _by_run(
 
 
 def _beside_own_terms(fit: Fit, kinds: Sequence[type[Effect]]) -> tuple[Array, Array] | None:
-    """As `_by_run`, with a stiffness and a damping of each run's own; None where the runs may not differ."""
+    """As `_by_run`, with a stiffness and a damping free in each run; None where the runs may not differ."""
     widest = with_own_linear_terms(fit, kinds)
     if widest is None:
         return None
@@ -244,11 +249,11 @@ def _beside_own_terms(fit: Fit, kinds: Sequence[type[Effect]]) -> tuple[Array, A
 def _in_runs(
     name: str, fit: Fit, alone: bool, shown: tuple[NDArray[np.bool_], Array, Array, Array]
 ) -> Iterator[SizeByRun]:
-    """The sizes of an effect, if two runs show it.
+    """The size of an effect in single runs; None unless two runs show it.
 
     Args:
-        name: of its severity, ``effect.parameter``.
-        shown: whether it acts, information, gradient and misfit by run, each of shape (runs,).
+        name: full name of the severity, ``effect.parameter``.
+        shown: whether the effect acts, information, gradient and misfit by run, each of shape (runs,).
     """
     size, unit, ids = fit.value(name), _units(fit)[name], [run.id for run in fit.problem.data.runs]
     acts, information, slope, noise = shown
@@ -278,24 +283,24 @@ def _in_runs(
 @styled
 def forest_figure(causes: Sequence[SizeByRun]) -> Figure:
     """The size of each cause in every run with its interval, and the common one as a band."""
-    tall = [0.8 + 0.2 * len(one.runs) for one in causes]
+    tall = [0.8 + 0.2 * len(cause.runs) for cause in causes]
     fig = figure(NARROW, sum(tall))
-    for axes, one in zip(
+    for axes, cause in zip(
         fig.subplots(len(causes), 1, squeeze=False, height_ratios=tall)[:, 0], causes, strict=True
     ):
-        low, high = one.common.ends
+        low, high = cause.common.ends
         axes.axvspan(low, high, color=NOISE, zorder=0)
-        axes.axvline(one.common.value, color=SOFT, lw=1.0)
-        rows = np.arange(len(one.runs))
-        values = [given.value for given in one.runs.values()]
-        reach = [INTERVAL * given.known_std for given in one.runs.values()]
+        axes.axvline(cause.common.value, color=SOFT, lw=1.0)
+        rows = np.arange(len(cause.runs))
+        values = [given.value for given in cause.runs.values()]
+        reach = [INTERVAL * given.known_std for given in cause.runs.values()]
         axes.errorbar(values, rows, xerr=reach, fmt="o", ms=4, color=AFTER, capsize=2)
-        axes.set_yticks(rows, list(one.runs))
+        axes.set_yticks(rows, list(cause.runs))
         axes.set(ylim=(len(rows) - 0.4, -0.6))
         symbol = next(
-            info.symbol for info in effect_class(one.effect).parameters() if info.name == one.parameter
+            info.symbol for info in effect_class(cause.effect).parameters() if info.name == cause.parameter
         )
-        axes.set_xlabel(f"{plain(one.effect)} {symbol} [{unit_mark(one.common.unit)}]")
+        axes.set_xlabel(f"{plain(cause.effect)} {symbol} [{unit_mark(cause.common.unit)}]")
         axes.locator_params(axis="x", nbins=5)
         grid(axes)
     return fig

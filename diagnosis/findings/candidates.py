@@ -48,8 +48,8 @@ if TYPE_CHECKING:
 
 
 UNDETERMINED_FROM: Final = 10.0
-"""Ratio of the standard deviation to the value and the typical size of a parameter above which it is not
-determined. Judgement. Even its order of magnitude is then unknown."""
+"""Maximum ratio of a parameter's standard deviation to its value and its typical size for it to be determined.
+Judgement. Above it, even the order of magnitude is unknown."""
 
 
 @dataclass(frozen=True)
@@ -58,10 +58,10 @@ class Candidate:
 
     Args:
         effect: name, ``none`` or ``unknown``; several names are joined by a plus sign.
-        probability: that it is the answer, a fraction.
-        excess_after: with it added, in the fitted runs, in units of the noise variance. Each instant and phase
-            of a single run counts as 10 of χ².
-        closed: share of the gap that it closes there.
+        probability: probability of the answer, a fraction.
+        excess_after: excess in the fitted runs with the answer added, in units of the noise variance. Each
+            instant and phase of a single run counts as 10 of χ².
+        closed: share of the gap in the fitted runs that the answer explains.
         parameters: its fitted parameters by name (``effect.parameter`` where it has several effects).
     """
 
@@ -77,11 +77,12 @@ def meant_parameter(found: Quantity, info: ParameterInfo, swing: float, undeterm
 
     Args:
         swing: largest angle of the motion, rad.
-        undetermined: standard deviation over value and usual size from which it is meaningless, a ratio.
+        undetermined: maximum standard deviation over value and usual size, a ratio; above it the parameter is
+            meaningless.
 
     Returns:
-        The estimate; not determined where its standard deviation exceeds a uniform distribution's over the
-        allowed range, or that multiple of the parameter's value and usual size.
+        The estimate. It is not determined where its standard deviation exceeds a uniform distribution's over
+        the allowed range, or this multiple of the parameter's value and usual size.
     """
     lower, upper = info.fit_range(swing)
     uniform = (upper - lower) / math.sqrt(12.0)
@@ -96,8 +97,8 @@ def meant_coefficient(estimate: Quantity, fit: Fit, name: str) -> Quantity:
         name: ``cn_beta``, ``cn_r``, ``omega_n``, ``zeta`` or a parameter of a joint's law.
 
     Returns:
-        The estimate; not determined where its standard deviation exceeds ωn itself, a damping ratio of 1, or the
-        coefficient whose moment equals the stiffness's or the critical damping's in the fastest wind.
+        The estimate. It is not determined where its standard deviation exceeds ωn itself, a damping ratio of 1,
+        or the coefficient that in the fastest wind gives the moment of the spring or of critical damping.
     """
     if name == "omega_n":
         return _limited(estimate, abs(estimate.value))
@@ -119,12 +120,12 @@ def meant_coefficient(estimate: Quantity, fit: Fit, name: str) -> Quantity:
 
 
 def _limited(found: Quantity, greatest: float) -> Quantity:
-    if found.std is None or 0.0 < found.std <= greatest:  # 0: the readings do not depend on it
+    if found.std is None or 0.0 < found.std <= greatest:  # 0: the readings do not depend on the parameter
         return found
     return replace(found, std=None, determined=False)
 
 
-_AT_LIMIT = 0.999  # of the greatest bandwidth: a search that ends above it is at the bound
+_AT_LIMIT = 0.999  # share of the greatest bandwidth: a search that ends above it is at the bound
 
 
 def candidates(study: Study, base: Base, errors: Mapping[str, float] = {}) -> tuple[Candidate, ...]:
@@ -169,7 +170,7 @@ def candidates(study: Study, base: Base, errors: Mapping[str, float] = {}) -> tu
 
 
 def _scatter(study: Study) -> set[str]:
-    """The chance differences that the runs may have: all that an answer without effects explains a gap by."""
+    """The chance differences that the runs may have: the only explanation of a gap in an answer without effects."""
     data = study.nominal.problem.data
     return {kind.name for kind in known_effects() if issubclass(kind, BetweenRuns) and data.may_show(kind)}
 
@@ -177,14 +178,14 @@ def _scatter(study: Study) -> set[str]:
 def inclusion(
     answers: Sequence[Candidate], read_off: Sequence[str], chosen: GapSettings, freedom: Freedom
 ) -> dict[str, float]:
-    """Probability of every effect of the vocabulary to be among the causes.
+    """Probability that an effect is among the causes, for every effect of the vocabulary.
 
     Args:
         freedom: of the body, which may exclude effects.
 
     Returns:
-        The sum of the probabilities of the answers that name the effect; for a cause detected in the records, 1
-        minus the rate at which a campaign without a gap is said to have one.
+        For each effect, the sum of the probabilities of the answers that name it. For a cause detected in the
+        records: 1 minus the false-alarm rate of the test of the gap.
     """
     found = {
         kind.name: min(sum(c.probability for c in answers if kind.name in c.effect.split(" + ")), 1.0)
@@ -247,7 +248,8 @@ def _parameters(
                 estimates[severity] = Quantity(size, size * relative, "1")
                 estimates[place] = Quantity(part.strouhal_number, part.bandwidth / reduced * relative, "1")
             else:
-                # a corner above the rig's frequencies looks white: only size over square root is known there
+                # above the rig's frequencies a random moment looks white: the runs show only size over square
+                # root of the corner
                 limit = "upper" if part.bandwidth >= _AT_LIMIT * LONGEST_BANDWIDTH else None
                 estimates[severity] = Quantity(intensity, intensity * relative, kind.parameters()[0].unit)
                 estimates[place] = Quantity(part.bandwidth, None, "Hz", bound=limit)
@@ -257,12 +259,12 @@ def _parameters(
 
 
 def parameter_errors(study: Study, closes: Closing) -> dict[str, float]:
-    """Further standard deviations of the answer's parameters, not due to the noise, by ``effect.parameter``.
+    """Standard deviations of the answer's parameters by other sources than noise, by ``effect.parameter``.
 
     Returns:
-        In the parameters' units of the similar campaign. They are the change by MuJoCo's integrator, where
-        it and the fits' integrator disagree; and the difference between halves of the data, which differ by more
-        than chance where the form of a cause is not exact (`move_of_halves`).
+        In the parameters' units of the similar campaign. One source is the change by MuJoCo's integrator, where
+        it and the fits' integrator disagree. The other is the difference between halves of the data, where they
+        differ by more than chance because the form of a cause is not exact (`move_of_halves`).
     """
     fit = study.chosen
     problem = fit.problem
@@ -290,8 +292,8 @@ ANSWER_DRAWN: Final = 0.01
 def ranked(candidates: Sequence[Candidate]) -> list[Candidate]:
     """The answers of a document, the most probable first.
 
-    The document starts with its answer. If undecided, that is the most probable set of effects, and an unknown
-    cause may be more probable.
+    The document starts with its answer. In an undecided diagnosis this is the most probable set of effects,
+    although an unknown cause may be more probable.
     """
     return sorted(candidates, key=lambda one: -one.probability)
 
@@ -365,7 +367,7 @@ def inclusion_line(inclusion: Mapping[str, float], least: float) -> str:
 
 
 SHOWN = 8
-"""Most answers drawn."""
+"""Maximum number of answers in the figure."""
 
 
 _LABEL = 24  # characters in a line of a label
@@ -385,7 +387,7 @@ def candidates_pictures(candidates: Sequence[Candidate]) -> tuple[Picture, ...]:
 
 @styled
 def candidates_figure(candidates: Sequence[Candidate]) -> Figure | None:
-    """The answers that are not improbable; None for fewer than two, where words suffice."""
+    """The answers that are not improbable; None if there are fewer than two: words suffice."""
     shown = [c for c in ranked(candidates)[:SHOWN] if c.probability >= ANSWER_DRAWN]
     if len(shown) < 2:
         return None

@@ -14,7 +14,7 @@ from tunnel_sim.effects import known_effects
 
 
 def _calm(answer: Findings) -> bool:
-    """Whether the residual gap is stated to be within the noise."""
+    """Whether the verdict says that the residual gap is within the noise."""
     return answer.rest is not None and not answer.rest.significant
 
 

@@ -28,14 +28,14 @@ class CauseSize:
     """Effect of a cause on three cycles of a swing, by the fitted model with it and without it.
 
     Args:
-        run: id of the run whose conditions are taken.
-        amplitude: of the release, rad.
+        run: id of the run that supplies the conditions.
+        amplitude: release angle, rad.
         damping_ratio: with the cause, dimensionless.
         damping_ratio_without: with every cause but this one, dimensionless.
-        frequency_change: of the natural frequency by the cause, a fraction.
-        zero_change: of the middle of the swing by the cause, in the unit of the readings.
+        frequency_change: relative change of the natural frequency by the cause, a fraction.
+        zero_change: change of the middle of the swing by the cause, in the unit of the readings.
         reading_change: root mean square of the change of the reading, in its unit.
-        stands: angle from rest within which the cause stops the body for good, rad; 0 where it does not.
+        stands: angle from rest within which the cause stops the body for good, rad; 0 where it never stops it.
     """
 
     effect: str
@@ -54,10 +54,10 @@ class CauseSize:
         return found | {"amplitude_rad": found.pop("amplitude"), "stands_rad": found.pop("stands")}
 
     def words(self, unit: str) -> str:
-        """The effect in a sentence; damping and frequency where they change visibly.
+        """The effect in a sentence, with damping and frequency if they change visibly.
 
         Args:
-            unit: of the readings.
+            unit: unit of the readings.
 
         Returns:
             Empty where the simulated run does not show it.
@@ -90,18 +90,18 @@ class CauseSize:
 
 
 _CYCLES = 3.0
-_FEWEST = 10  # block means in them
+_FEWEST = 10  # minimum number of block means in the cycles
 _CLOSE = 1e-12  # tolerance of the fit of a curve without noise
-_SHARE = 0.5  # of the largest swing: an amplitude that every run passes through
+_SHARE = 0.5  # share of the largest swing: an amplitude that every run passes through
 
 
 def cause_sizes(study: Study) -> tuple[CauseSize, ...]:
     """Simulate the fitted model with each cause and without it.
 
     Returns:
-        The size of every fitted cause, in the measured campaign's units. The simulated runs are free decays, so a
-        cause has none if it was detected in the records, is random, stops the motion at once, acts on driven runs
-        only, or acts on a body without a spring.
+        The size of every fitted cause, in the measured campaign's units. The simulated runs are free decays. A
+        cause therefore has no size if it was detected in the records, is random, stops the motion at once, acts
+        on driven runs only, or acts on a body without a spring.
     """
     fit, data = study.chosen, study.chosen.problem.data.undriven()
     if not data.model.restored:
@@ -150,10 +150,10 @@ def cause_sizes(study: Study) -> tuple[CauseSize, ...]:
 
 
 def decay_of_swing(fit: Fit) -> tuple[float, float] | None:
-    """The decay of the fitted motion as a whole over three cycles from half of the largest swing.
+    """Decay of the fitted motion over three cycles, from half of the largest swing.
 
     Returns:
-        Angular frequency (rad/s) and damping ratio, of the first run; None where its motion there is not a decay.
+        Angular frequency (rad/s) and damping ratio, of the first run; None unless its motion there is a decay.
     """
     data = fit.problem.data
     release = fit.point.per_run.copy()
@@ -167,7 +167,7 @@ def decay_of_swing(fit: Fit) -> tuple[float, float] | None:
 
 
 def _decay(interval: float, curve: Array, frequency: float) -> tuple[float, float, float] | None:
-    """Angular frequency (rad/s), damping ratio and mean of a few cycles; None where they are not a decay."""
+    """Angular frequency (rad/s), damping ratio and mean of a few cycles; None unless they are a decay."""
     if curve.size < _FEWEST or not np.all(np.isfinite(curve)):
         return None
     reading = Reading(interval * np.arange(curve.size, dtype=np.float64), curve)

@@ -29,9 +29,9 @@ class NamedCauses:
         ambiguous_with: effects that the runs cannot distinguish from the causes.
         candidates: the answers considered, the answer first.
         inclusion: by effect, the probability that it is among the causes.
-        choices: springs; one of them may be off.
+        choices: springs of which one may have a wrong stiffness.
         robot: whether the body is the joint of a machine.
-        rivals_from: least probability of a rival that is named.
+        rivals_from: minimum probability of a rival that is named.
     """
 
     causes: tuple[str, ...]
@@ -46,12 +46,12 @@ class NamedCauses:
         """The causes common to the likely answers, each with its probability, and the alternatives beside them.
 
         Args:
-            sized: whether the springs, one of them off, are given with their errors; False where another sentence
-                does so.
+            sized: whether the possible errors of the springs are given; False where another sentence gives
+                them.
 
         Returns:
-            Text such as ``coulomb friction (98 %), and either a spring of 16.12 N m/rad that is 1.96 % softer than
-            stated (59 %) or gravity stiffness (40 %)``.
+            Text such as ``coulomb friction (98 %), and either a spring of 16.12 N m/rad that is 1.96 % softer
+            than stated (59 %) or gravity stiffness (40 %)``.
         """
         certain, alternatives = self.certain_and_open(sized=sized)
         scatter = [BETWEEN_RUNS] if scattering(self.causes) else []
@@ -74,7 +74,7 @@ class NamedCauses:
 
         Args:
             candidate: the answer.
-            name: of the effect.
+            name: name of the effect.
             deviations: whether standard deviations are stated.
         """
         kind = {kind.name: kind for kind in known_effects()}.get(name)
@@ -101,7 +101,8 @@ class NamedCauses:
             return f"Repair or model the cause of {plain(name)}"
         values = _parameters(self.candidates[0], name)
         for full, one in values.items():
-            value = f"{one.value:g}" if one.std == 0.0 else f"{one.value:.4g}"  # stated, or estimated
+            # the inertia is stated or estimated
+            value = f"{one.value:g}" if one.std == 0.0 else f"{one.value:.4g}"
             said = said.replace(f"{{{full}}}", f"{value} {unit_mark(one.unit)}")
         return said
 
@@ -127,7 +128,7 @@ class NamedCauses:
         return certain, alternatives
 
     def _called(self, candidate: Candidate, name: str, sized: bool) -> str:
-        """An effect by its name; a spring error by the spring and its relative error."""
+        """The name of an effect; for a spring error, the spring and its relative error."""
         kind = {kind.name: kind for kind in known_effects()}.get(name)
         if kind is None or not kind.chosen_spring():
             return plain(name)

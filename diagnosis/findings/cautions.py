@@ -1,6 +1,6 @@
 """Caveats, remarks on the noise, and notes, each under the kind of its fact.
 
-A sentence is a template of the fact's figures, or a function of them where a template is not enough.
+A sentence is a template filled with the fact's figures, or a function of them where a template is not enough.
 """
 
 from __future__ import annotations
@@ -163,7 +163,7 @@ NOISE: Mapping[str, Sentence] = {
     "differs by run": "the records contradict the stated {stated_rad:3}: their noise differs by run, "
     "{least_rad:3} to {most_rad:3}",
 }
-"""Reasons for the noise used: clauses."""
+"""Clauses that give the reason for the noise used."""
 
 REMARKS: Mapping[str, tuple[Sentence, str]] = {
     "within step": (
@@ -225,7 +225,7 @@ PATCH: Mapping[str, Sentence] = {
     "RK4 and shorter steps do not. The apparent inertia of dampers in such steps is subtracted from the value "
     "written.",
 }
-"""Differences between the patched model and the law found."""
+"""Sentences on the differences between the patched model and the law found."""
 
 
 @dataclass(frozen=True)
@@ -233,7 +233,7 @@ class _Reading:
     """A reading in a sentence, with as many digits as its format asks for.
 
     Args:
-        value: in the unit.
+        value: the reading, in the unit.
     """
 
     value: float
@@ -247,8 +247,8 @@ def sentence_of(sentences: Mapping[str, Sentence], given: Fact, unit: str = "rad
     """The sentence of a fact of the document.
 
     Args:
-        given: the fact; figures whose names end in ``_rad`` are readings.
-        unit: of the readings: rad, rad/s or rad/s².
+        given: the fact; figures with names ending in ``_rad`` are readings.
+        unit: unit of the readings: rad, rad/s or rad/s².
     """
     sentence = sentences[given.kind]
     shown = {
@@ -261,6 +261,6 @@ def sentence_of(sentences: Mapping[str, Sentence], given: Fact, unit: str = "rad
 
 
 def remark(given: Noted, unit: str = "rad") -> Remark:
-    """The remark of a fact about the noise, as in `sentence_of`."""
+    """The remark for a fact about the noise; arguments as in `sentence_of`."""
     what, remedy = REMARKS[given.fact.kind]
     return Remark(Outcome.NOTED, given.runs, sentence_of({given.fact.kind: what}, given.fact, unit), remedy)

@@ -1,4 +1,4 @@
-"""The gap before and after the causes, by MuJoCo and on held-out readings; causes that these do not confirm go."""
+"""The gap before and after the causes, by MuJoCo and on held-out readings; causes that do not reduce it go."""
 
 from __future__ import annotations
 
@@ -39,18 +39,19 @@ INTEGRATOR_TOLERANCE: Final = 0.1
 """Maximum difference between MuJoCo and the integrator of the fits, in std of a block mean. Judgement."""
 
 ABSORBED_RATE: Final = 0.001
-"""Probability of deviations as large, by the stated widths, below which they absorb a cause. Convention. One
-campaign in 1000 as stated; a cause that the deviations would absorb is many widths off."""
+"""Minimum probability, by the stated widths, of deviations as large as the fitted ones; below it the deviations
+have absorbed a cause. Convention. One campaign in 1000 as stated; a wrong spring gives deviations of many
+widths."""
 
 
 @dataclass(frozen=True)
 class Closing:
-    """The explained share of the gap on held-out readings.
+    """The share of the gap on held-out readings that the causes explain.
 
     Args:
         gap: before and after, by MuJoCo.
         steps: the gap as the causes are added.
-        seconds: wall time by step, s.
+        seconds: wall time of each step, s.
         shifts: MuJoCo's readings of the answer's model minus the fits' readings, in noise standard deviations of
             block means, by run id.
     """
@@ -79,10 +80,10 @@ def closing(study: Study) -> Closing:
 
 
 def closed_study(study: Study) -> Study:
-    """The study with the gap of runs that repeat exactly, where stated differences between them absorb a cause.
+    """The study, with the gap computed for runs that repeat exactly if stated scatter absorbs a cause.
 
-    Deviations of many widths leave no residual of a wrong spring, although the test of the gap counts them. Where
-    the deviations are as stated they are no gap, and a cause may not be credited with them.
+    Deviations of many widths fit a wrong spring without a residual, yet the test of the gap counts them.
+    Deviations within the stated widths are not a gap, so no cause is credited with them.
     """
     nominal = study.nominal
     if not study.named or not nominal.problem.scatter:
@@ -104,10 +105,10 @@ def confirmed(study: Study) -> tuple[Study, Closing]:
 
 
 def _without_needless(study: Study, steps: Waterfall) -> Study | None:
-    """The study whose answer is the part of the fitted causes that predicts best.
+    """The study with the subset of the fitted causes that predicts held-out readings best.
 
     Returns:
-        None where all of them together predict best; or beside a random moment, which absorbs the causes.
+        None where all of them together predict best, or beside a random moment, which absorbs the causes.
     """
     answer = study.answer
     if answer is None or not study.named or study.moment is not None:
@@ -130,7 +131,7 @@ class Comparison:
     """Runs predicted by the MuJoCo model and by the forward integrator of the fits.
 
     Args:
-        ids: of the runs.
+        ids: run ids.
         residuals: reading minus MuJoCo's block means, in noise standard deviations, by run; the residuals of the
             forward integrator where MuJoCo could not integrate the motion.
         differences: MuJoCo's block means minus the forward integrator's, rad, by run.
@@ -156,8 +157,8 @@ def compare(problem: Problem, common: Array, release: Array) -> Comparison:
     """Predict runs with both models.
 
     Args:
-        common: common parameters, shape (common,), or (runs, common) where each run has its own, as for runs held
-            out of different fits.
+        common: common parameters, shape (common,), or (runs, common) where each run has its own: runs held out
+            of different fits.
         release: every run's own parameters, shape (runs, own).
     """
     runs = problem.data.runs
@@ -185,10 +186,10 @@ def confirm(comparisons: Sequence[Comparison], tolerance: float) -> Confirmation
     """Judge whether the two models agree.
 
     Args:
-        tolerance: greatest root mean square difference of a run over the noise of a block mean, a ratio.
+        tolerance: maximum root mean square difference of a run over the noise of a block mean, a ratio.
 
     Returns:
-        The largest difference, and the root mean square difference of the run closest to its tolerance.
+        The largest difference, and the root mean square difference of the run nearest to its tolerance.
     """
     largest, worst, found = 0.0, -1.0, ("", 0.0, 0.0)
     for comparison in comparisons:
@@ -206,8 +207,8 @@ def confirm(comparisons: Sequence[Comparison], tolerance: float) -> Confirmation
 def mujoco_blocks(problem: Problem, common: Array, release: Array) -> list[Array]:
     """Block means of the reading from the MuJoCo model.
 
-    Effects of the sensor act on every sample before averaging; the fits, which average first, only approximate
-    that.
+    Effects of the sensor act on every sample before averaging; the fits average first, which is an
+    approximation.
 
     Args:
         common: common parameters of every run, shape (runs, common).
@@ -219,11 +220,11 @@ def mujoco_blocks(problem: Problem, common: Array, release: Array) -> list[Array
     Raises:
         TunnelError: when the motion diverges.
     """
-    from tunnel_sim.engine.simulate import simulate_motions  # only here: MuJoCo is slow to load
+    from tunnel_sim.engine.simulate import simulate_motions  # imported here because MuJoCo is slow to load
 
     runs, rig = problem.data.runs, campaign_rig(problem.data)
     chains = [problem.chain(*each) for each in zip(common, release, runs, strict=True)]
-    simulated: dict[float, list[int]] = {}  # by interval
+    simulated: dict[float, list[int]] = {}  # numbers of the runs by sample interval
     settings = []
     for i, (run, chain) in enumerate(zip(runs, chains, strict=True)):
         physics = released_by_spring_end(condensed(chain.physics(), problem.data))
@@ -244,11 +245,11 @@ class Reported:
     """Residuals from the MuJoCo model, in noise standard deviations of block means, by run id.
 
     Args:
-        before: of the nominal model fitted to all runs.
-        before_out: of the nominal model, for the runs that could be held out of its fit.
-        after: of the answer's model, held out where possible, else from its fit to all runs.
+        before: residuals of the nominal model fitted to all runs.
+        before_out: residuals of the nominal model, for the runs that could be held out of its fit.
+        after: residuals of the answer's model, held out where possible, else from its fit to all runs.
         held_out: ids of the runs that could be held out.
-        confirmation: agreement of MuJoCo and the fits' integrator on these.
+        confirmation: agreement of MuJoCo and the fits' integrator on these runs.
         shifts: MuJoCo's block means of the answer's model minus the block means of the fits' integrator.
     """
 
@@ -261,11 +262,11 @@ class Reported:
 
 
 def report_fits(nominal: Fit, chosen: Fit, nominal_out: HeldOut, chosen_out: HeldOut) -> Reported:
-    """Predict the reported runs with the MuJoCo model, each fit once.
+    """Predict the reported runs with the MuJoCo model, once for each fit.
 
     Returns:
-        The residuals. Those of the nominal model's held-out runs are from the fits' integrator, corrected by the
-        difference to MuJoCo in the similar fit of all runs.
+        The residuals. The nominal model's residuals of held-out runs are from the fits' integrator, corrected
+        by its difference from MuJoCo in the similar fit of all runs.
     """
     before = compare(nominal.problem, nominal.point.common, nominal.point.per_run)
     before_out = {
@@ -297,7 +298,7 @@ def report_fits(nominal: Fit, chosen: Fit, nominal_out: HeldOut, chosen_out: Hel
 
 def gap_summary(study: Study, base: Base, shown: Reported) -> GapSummary:
     """The gap of the campaign and of every run, in noise variances of a sample."""
-    ratio = base.extra + 1.0  # estimated noise over the base
+    ratio = base.extra + 1.0  # estimated noise over the reference noise
     moment = study.moment
     explained = 0.0 if study.prepared.coarse and COARSE_STEP.name in study.causes else base.extra
     predicted = {**shown.before, **shown.before_out} if study.causes else shown.before
@@ -334,9 +335,9 @@ def gap_summary(study: Study, base: Base, shown: Reported) -> GapSummary:
 
 
 def held_out_totals(gap: GapSummary, held_out: Waterfall) -> GapSummary:
-    """The summary with the totals of the waterfall, so that all figures and sentences state the same gap.
+    """The summary with the totals of the waterfall, so that all figures and sentences state one gap.
 
-    Unchanged where nothing is found.
+    Unchanged for a campaign without a gap.
     """
     if not gap.detected:
         return gap

@@ -1,4 +1,4 @@
-"""The size of a gap, its measure, and the share that each cause explains."""
+"""The size of a gap, the readings on which it is measured, and the share that each cause explains."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ class RunGap:
     """A run's excess before and after the causes are added.
 
     Args:
-        before: ratio of mean squared residual to noise variance, minus one, of the nominal model, predicted from
-            the other runs where the run could be held out.
+        before: ratio of mean squared residual to noise variance, minus one, of the nominal model, predicted
+            from the other runs where the run could be held out.
         after: the same ratio minus one with the causes added.
-        held_out: whether the run could be held out; else both come from fits of all runs.
+        held_out: whether the run could be held out; else both ratios come from fits of all runs.
     """
 
     id: str
@@ -51,16 +51,16 @@ class GapSummary:
     """The gap of the campaign.
 
     Args:
-        excess_before: of the nominal model, in units of the noise variance, on held-out readings; where
-            nothing is found, in the fitted runs.
+        excess_before: excess of the nominal model, in units of the noise variance, on held-out readings; in a
+            campaign without a gap, in the fitted runs.
         excess_after: with the causes added, on the same readings, in units of the noise variance.
         closed: share of the gap that is closed, 0 to 1.
-        closed_on: the readings on which these are measured (`diagnosis.findings.closure`).
-        false_alarm_rate: of the test of detection, a fraction of the campaigns without a gap.
-        p_value: of the strongest test, corrected for the number of tests.
+        closed_on: the readings on which the excesses are measured (`diagnosis.findings.closure`).
+        false_alarm_rate: false-alarm rate of the test of the gap, a fraction of the campaigns without a gap.
+        p_value: p-value of the strongest test, corrected for the number of tests.
         tests: p-value by name of test.
-        closed_ahead: share of the gap in the later half of driven runs that the causes explain, fitted to the
-            earlier half; None where runs are held out whole, or are not driven.
+        closed_ahead: share of the gap in the later half of driven runs that the causes explain when fitted to
+            the earlier half; None where runs are held out whole, or are not driven.
     """
 
     detected: bool
@@ -84,7 +84,7 @@ class GapSummary:
 
 
 FITTED = "in the fitted runs (none could be held out)"
-"""The readings on which a gap before and after is measured, as in the document."""
+"""The readings on which the gap before and after the causes is measured, as in the document."""
 
 
 @dataclass(frozen=True)
@@ -93,10 +93,10 @@ class Confirmation:
 
     Args:
         agrees: whether every run's difference is within the tolerance, and MuJoCo could predict them all.
-        largest_difference: of any block mean of any run, rad.
+        largest_difference: largest difference of any block mean of any run, rad.
         run: id of the run that is closest to its tolerance, or farthest beyond it.
         rms_difference: root mean square of that run's differences, rad.
-        tolerance: of it, a tenth of a block mean's noise, rad.
+        tolerance: maximum root mean square difference, a tenth of a block mean's noise, rad.
         failure: why MuJoCo could not predict the runs; empty where it could.
     """
 
@@ -108,7 +108,7 @@ class Confirmation:
     failure: str = ""
 
     def scaled(self, factor: float) -> Confirmation:
-        """This gap with all readings times a factor: from a similar rig's to the measured one's."""
+        """This agreement with all readings times a factor, from a similar rig's to the measured one's."""
         return replace(
             self,
             largest_difference=self.largest_difference * factor,
@@ -137,10 +137,11 @@ class NoiseSummary:
     """The reference noise of the gap.
 
     Args:
-        std: of one sample, quantisation included, rad.
-        stated_std: of one sample, as stated by the campaign, rad; None where it is not stated.
+        std: standard deviation of one sample, quantisation included, rad.
+        stated_std: standard deviation of one sample as stated by the campaign, rad; None where it is not
+            stated.
         source: origin of ``std``: ``stated``, ``estimated`` or ``floor``, the accuracy of the fits.
-        reason: for it, in words; empty until they are written.
+        reason: reason for this noise, in words; empty until they are written.
     """
 
     std: float
@@ -193,7 +194,7 @@ def runs_table(
 
 
 def waterfall_table(waterfall: Waterfall, misfit: Misfit) -> TextTable:
-    """The residual gap with each cause added, and without each; a table without rows where no cause is named."""
+    """The residual gap as each cause is added, and without each; a table without rows where no cause is named."""
     steps, without = waterfall.steps, waterfall.without
     rows = []
     for step in steps if len(steps) > 1 else ():
@@ -207,10 +208,10 @@ def waterfall_table(waterfall: Waterfall, misfit: Misfit) -> TextTable:
 
 
 def shares_of_gap(waterfall: Waterfall) -> dict[str, tuple[float, str]]:
-    """By cause, its share of the gap as the causes are added, and the causes added in the same step.
+    """By cause, the share of the gap that its step explains, and the causes added in the same step.
 
-    Chance differences between the runs come last: they remain where a cause is removed from the rig. The fit of the
-    waterfall adds them first, where they absorb a part of the causes.
+    Chance differences between the runs come last, because they remain where a cause is removed from the rig.
+    The fit of the waterfall adds them first, where they absorb a part of the causes.
     """
     found: dict[str, tuple[float, str]] = {}
     taken = list(waterfall.steps)
@@ -246,7 +247,7 @@ TESTS = {
     "noise in bursts": "whether the noise comes in bursts",
     "noise level": "whether the noise is above the level that the campaign states",
 }
-"""The tested properties, by the names of the tests."""
+"""Names of the tests, and the properties that they test."""
 
 
 def tests_table(gap: GapSummary) -> TextTable:
@@ -261,17 +262,17 @@ def noise_line(noise: NoiseSummary, unit: str) -> str:
     """The noise to which the gap is compared, and its origin.
 
     Args:
-        unit: of the readings.
+        unit: unit of the readings.
     """
     size = f"{reading_shown(noise.std, 3, unit)} (noise_std = {noise.std:.3g} {unit_mark(unit)})"
     return f"Noise: {size}, {noise.source} ({noise.reason})."
 
 
 def model_line(checked: Confirmation, unit: str) -> str:
-    """The model that the gaps are computed with; empty where a caveat says more about it.
+    """The model that computes the gaps; empty where a caveat says more about it.
 
     Args:
-        unit: of the readings.
+        unit: unit of the readings.
     """
     if not checked.agrees:
         return ""
@@ -290,7 +291,7 @@ WITHIN_THE_NOISE = "within the noise"
 
 
 def waterfall_pictures(waterfall: Waterfall, maps: Maps | None, judged: Judged) -> tuple[Picture, ...]:
-    """The residual gap as the causes are added; none without causes."""
+    """Figure of the residual gap as the causes are added; none without causes."""
     circles = " Open circles: all causes but this one." if len(waterfall.without) > 1 else ""
     drawn = Picture(
         "waterfall",
@@ -302,7 +303,7 @@ def waterfall_pictures(waterfall: Waterfall, maps: Maps | None, judged: Judged) 
 
 
 def closure_pictures(gap: GapSummary, maps: Maps | None) -> tuple[Picture, ...]:
-    """The gap run by run."""
+    """Figure of the gap run by run."""
     drawn = Picture(
         "how-far",
         "Misfit of every run before and after. Filled circles: the run was held out of the fit, and only its "
@@ -317,8 +318,8 @@ def closure_pictures(gap: GapSummary, maps: Maps | None) -> tuple[Picture, ...]:
 def waterfall_figure(waterfall: Waterfall, maps: Maps | None, judged: Judged) -> Figure:
     """The residual gap as the causes are added one after another.
 
-    A dot for the nominal gap, a bar for each cause from the residual before it to the residual after it, and a dot
-    for the rest, on a linear scale of the root mean square misfit.
+    A dot for the nominal gap, a bar for each cause from the residual before it to the residual after it, and a
+    dot for the remainder, on a linear scale of the root mean square misfit.
     """
     steps = waterfall.steps
     unit, size = judged.misfit.scale()
@@ -353,7 +354,7 @@ def waterfall_figure(waterfall: Waterfall, maps: Maps | None, judged: Judged) ->
         shown[-1] += ", material" if judged.rest_is_material else ", immaterial"
     else:
         shown[-1] = WITHIN_THE_NOISE
-    # The residual after the last cause is given in the row of the rest.
+    # The row of the remainder gives the residual after the last cause.
     words = [shown[0], *(f"leaves {text}" for text in shown[1:-1]), "", shown[-1]]
     _place_texts(axes, words, [misfits[0], *upper, misfits[-1]], [*alone, np.nan])
     noise = size(SIGMAS * (maps.excess_std if maps else _LEAST_EXCESS))
@@ -371,11 +372,11 @@ _STEP_LABEL = 20  # characters in a line of a label
 _LEAST_EXCESS, _LEAST_NOISE = (
     1e-3,
     0.03,
-)  # of an excess and of three standard deviations: for a document without maps
-_VISIBLE = 0.01  # of the axis: a narrower band is invisible, and has no key
+)  # share of an excess and of three standard deviations, for a document without maps
+_VISIBLE = 0.01  # share of the axis: a narrower band is invisible, and has no key
 _BESIDE = 7.0  # points between a mark and its text
 _MARK = 5.0  # points: the mark of the residual gap without one cause
-_BEFORE_ZERO = 0.03  # of the axis: keeps a mark at zero clear of the labels
+_BEFORE_ZERO = 0.03  # share of the axis that keeps a mark at zero clear of the labels
 
 
 def _place_texts(axes: Axes, words: Sequence[str], ends: Sequence[float], marks: Sequence[float]) -> None:
@@ -394,7 +395,7 @@ def _place_texts(axes: Axes, words: Sequence[str], ends: Sequence[float], marks:
         for row, (text, end) in enumerate(zip(words, ends, strict=True))
     ]
     widths = [_BESIDE + points * text.get_window_extent().width for text in texts]
-    beside = np.fmax(ends, marks)  # position of a text that has to clear the mark
+    beside = np.fmax(ends, marks)  # position of a text that would overlap the mark
     free = (1.0 + _BEFORE_ZERO) * (1.0 - np.array(widths) / whole) - _BEFORE_ZERO
     reach = float(max(np.max(beside / free), 1.05 * np.max(beside))) or 1.0
     axes.set_xlim(-_BEFORE_ZERO * reach, reach)

@@ -42,18 +42,19 @@ class Coefficients:
     """Coefficients of the nominal model before and after the causes are added.
 
     Args:
-        before: by name: ``cn_beta`` and ``cn_r``; these times the rig's unstated sizes (``cn_beta_area_length``,
-            ``cn_r_area_length2``); ``omega_n`` and ``zeta`` in normalised form; or ``yaw_inertia``,
-            ``mechanical_damping`` and ``moment_offset`` of a body without a spring.
-        after: by the same names, with the causes.
-        in_phase: with a named lag, ``cn_beta`` and ``cn_r`` in phase with angle and rate, which the runs determine
-            better than the coefficients of the law beside the lag; else empty.
+        before: by name: ``cn_beta`` and ``cn_r``; their products with the rig's unstated sizes
+            (``cn_beta_area_length``, ``cn_r_area_length2``); ``omega_n`` and ``zeta`` in normalised form; or
+            ``yaw_inertia``, ``mechanical_damping`` and ``moment_offset`` of a body without a spring.
+        after: by the same names, with the causes added.
+        in_phase: with a named lag, ``cn_beta`` and ``cn_r`` in phase with angle and rate; the runs determine
+            these better than the coefficients of the law beside the lag. Empty without a named lag.
         covariance: of ``cn_beta`` and ``cn_r`` in ``after``, and of both in ``in_phase``, 1/rad², shape (4, 4);
             empty without a named lag.
-        note: on their meaning, where a cause changes it (a lag changes the meaning of Cnr).
-        correlation: of the coefficients after, in their order, by the noise of the readings, the small causes and
-            the rivals; the other parts of their variances count as independent. Shape (n, n); empty where it is not
-            known.
+        note: the meaning of the coefficients where a cause changes it, as a lag changes that of Cnr; else
+            empty.
+        correlation: correlation of the coefficients in ``after``, in their order, by the noise of the readings,
+            the small causes and the rivals; the other parts of the variances are taken as independent. Shape
+            (n, n); empty where it is not known.
     """
 
     before: Mapping[str, Quantity]
@@ -73,23 +74,23 @@ class Coefficients:
 
 
 def coefficients_table(given: Coefficients, judged: Judged) -> TextTable:
-    """The coefficients of the nominal model; where causes are named, also with these, and the change of size.
+    """The coefficients of the nominal model and, if causes are named, with the causes, and the change of size.
 
-    A terminal shows the 95 % intervals only where one is not the value ± 1.96 standard deviations.
+    A terminal shows the 95 % intervals only where one differs from the value ± 1.96 standard deviations.
     """
     before, after = given.before, given.after
     named, rows = judged.names_effects, []
-    skewed = any(one.interval for one in (after or before).values())
+    skewed = any(quantity.interval for quantity in (after or before).values())
     for label, nominal, with_causes in _rows(given):
         best = with_causes or nominal
-        cells = [_without_interval(one) for one in ([nominal, with_causes] if named else [best])]
+        cells = [_without_interval(quantity) for quantity in ([nominal, with_causes] if named else [best])]
         interval = _interval(best)
         if skewed and best is not None and best.std:
             cells[-1] += f"\n({interval})"
         change = "–"
-        both = [one for one in (nominal, with_causes) if one and one.determined]
+        both = [quantity for quantity in (nominal, with_causes) if quantity and quantity.determined]
         if len(both) == 2 and both[0].value:
-            change = size_change(*(one.value for one in both))
+            change = size_change(*(quantity.value for quantity in both))
         rows.append((label, *cells, *[interval] * (not skewed), *[change] * named))
     causes = "with the causes" if judged.decided else f"with the {judged.set_out}"
     detail = () if skewed else ("95 % interval",)
@@ -102,7 +103,8 @@ def coefficients_table(given: Coefficients, judged: Judged) -> TextTable:
 def _rows(given: Coefficients) -> Iterator[tuple[str, Quantity | None, Quantity | None]]:
     """Label of a coefficient, and its estimates by the nominal model and with the causes.
 
-    The nominal model has no lag, so with a named lag its coefficients compare with the derivatives in phase.
+    With a named lag the nominal coefficients compare with the derivatives in phase: the nominal model has no
+    lag.
     """
     before, after = given.before, given.after
     phase = given.in_phase
@@ -166,16 +168,16 @@ def budget_table(given: Coefficients) -> TextTable:
 
 
 def coefficients_line(given: Coefficients) -> str:
-    """Contributions to the coefficients' standard deviations that ``identify`` does not include.
+    """The part of the coefficients' standard deviations that ``identify`` does not include, by source.
 
-    Empty where none is known.
+    Empty if there is no such part.
     """
-    after = {name: one for name, one in given.after.items() if one.std}
+    after = {name: quantity for name, quantity in given.after.items() if quantity.std}
     if not after:
         return ""
     parts = []
     for source, words in SOURCES.items():
-        shares = {name: one.shares.get(source, 0.0) for name, one in after.items()}
+        shares = {name: quantity.shares.get(source, 0.0) for name, quantity in after.items()}
         if max(shares.values()) >= _COUNTS:
             mostly = listed(
                 [COEFFICIENTS.get(name, name) for name, share in shares.items() if share > _MOST] or [""]
@@ -183,7 +185,7 @@ def coefficients_line(given: Coefficients) -> str:
             parts.append(f"{words} (most of the variance of {mostly})" if mostly else words)
     if not parts:
         return ""
-    if all(one.shares.keys() <= {"noise", "scatter", "air density"} for one in after.values()):
+    if all(quantity.shares.keys() <= {"noise", "scatter", "air density"} for quantity in after.values()):
         return f"± is the ± of tunnel identify; it includes {listed(parts)}."
     return (
         f"± includes {listed(parts)}. The ± of tunnel identify includes the noise, the scatter between runs and "
@@ -191,8 +193,8 @@ def coefficients_line(given: Coefficients) -> str:
     )
 
 
-_COUNTS = 0.005  # of a variance: a smaller share changes no digit of its root
-_MOST = 0.5  # of a variance: more than all its other sources together
+_COUNTS = 0.005  # share of a variance: a smaller one changes no digit of its root
+_MOST = 0.5  # share of a variance: it exceeds all other sources together
 
 
 def hidden_table(hidden: Sequence[Hidden], given: Coefficients) -> TextTable:
@@ -220,27 +222,30 @@ def _limit(one: Hidden, value: float) -> str:
 
 
 def hidden_line(hidden: Sequence[Hidden], given: Coefficients) -> str:
-    """The undetected effects that would change a coefficient by more than its ±; empty where none would.
+    """The undetected effects that would change a coefficient by more than its ±; empty if there are none.
 
-    The one with the greatest change against the ±, and each that states how to read the coefficients without it.
+    Named are the effect with the greatest change relative to the ±, and each effect that states how to read the
+    coefficients without it.
     """
     after, general_form = given.after, Effect.undetected
     clauses: list[tuple[bool, str]] = []
-    for one in hidden:
+    for hidden_effect in hidden:
         moved = []
         for name, own in after.items():
-            move = one.moves.get(name)
+            move = hidden_effect.moves.get(name)
             if move is not None and own.std and move.value > own.std:
                 by = f"{significant(move.value, 2)} {'' if own.unit == '1' else unit_mark(own.unit)}"
                 moved.append((COEFFICIENTS.get(name, name), by.strip()))
-        form = next((kind.undetected for kind in known_effects() if kind.name == one.effect), general_form)
+        form = next(
+            (kind.undetected for kind in known_effects() if kind.name == hidden_effect.effect), general_form
+        )
         template = form if moved else ""
         general = template == general_form
-        if not moved or (general and any(said for said, _ in clauses)):
+        if not moved or (general and any(is_general for is_general, _ in clauses)):
             continue
-        size = _limit(one, abs(one.size.value))
+        size = _limit(hidden_effect, abs(hidden_effect.size.value))
         changes = " and ".join(f"{label} by {by}" for label, by in moved) if general else moved[-1][1]
-        words = {"effect": plain(one.effect), "size": size + explained({one.size.unit})}
+        words = {"effect": plain(hidden_effect.effect), "size": size + explained({hidden_effect.size.unit})}
         clause = template.format(changes=changes, **words)
         clauses.append((general, f"{clause[0].upper()}{clause[1:]}."))
     return f"Upper limits: {' '.join(clause for _, clause in clauses)}" if clauses else ""
@@ -255,20 +260,20 @@ def consequence(given: Coefficients, judged: Judged) -> str:
     if not judged.causes or judged.causes == UNKNOWN:
         return ""
     phase = given.in_phase
-    for name, one in given.before.items():
-        two = {**given.after, **phase}.get(name)
-        if two is None or not one.value or not (one.determined and two.determined):
+    for name, before in given.before.items():
+        after = {**given.after, **phase}.get(name)
+        if after is None or not before.value or not (before.determined and after.determined):
             continue
         label = COEFFICIENTS.get(name, name)
-        if two.std is not None and two.std > _OPEN * abs(two.value):
+        if after.std is not None and after.std > _OPEN * abs(after.value):
             clauses.append(
-                f"{label} remains uncertain ({for_people(two.value, two.std, unit_mark(two.unit))})"
+                f"{label} remains uncertain ({for_people(after.value, after.std, unit_mark(after.unit))})"
             )
             continue
-        label = f"the size of {label}" if one.value < 0.0 and two.value < 0.0 else label
-        share = 100.0 * relative_change(one.value, two.value)
-        values = _apart(one.value, two.value)
-        if one.value * two.value < 0.0:
+        label = f"the size of {label}" if before.value < 0.0 and after.value < 0.0 else label
+        share = 100.0 * relative_change(before.value, after.value)
+        values = _apart(before.value, after.value)
+        if before.value * after.value < 0.0:
             clauses.append(f"{COEFFICIENTS.get(name, name)} changes its sign ({values})")
         elif abs(share) < 0.5:
             clauses.append(f"{label} changes by less than 1 %")
@@ -282,7 +287,7 @@ def consequence(given: Coefficients, judged: Judged) -> str:
 
 
 def _of_the_rate(given: Coefficients) -> str:
-    """The two parts of Cnr in phase with the rate, in a sentence."""
+    """A sentence on the two parts of Cnr in phase with the rate."""
     name = next(name for name in given.in_phase if name.startswith("cn_r"))
     whole, own = given.in_phase[name], given.after[name]
     lag = _digits(whole.value - own.value, 3)
@@ -309,7 +314,7 @@ def _digits(value: float, digits: int) -> str:
 
 
 def coefficient_note(given: Coefficients, judged: Judged) -> str:
-    """Notes on the coefficients: changes of meaning by a cause, and the effect of unstated sizes."""
+    """Notes on the coefficients: their changed meaning under a cause, and the effect of unstated sizes."""
     if judged.cycling:
         return _NO_DECAY
     before = given.before

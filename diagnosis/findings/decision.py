@@ -17,7 +17,8 @@ PREDICTED_FROM: Final = 0.1
 """Minimum share of the gap on held-out readings that a decided answer must explain. Judgement. An answer that
 predicts less is fitted to chance."""
 LEFT_OF_SWING: Final = 0.1
-"""Maximum root mean square residual of a decided answer, as a share of the readings' own about their mean.
+"""Maximum root mean square residual of a decided answer, as a share of the readings' root mean square about
+their mean.
 Judgement. A model that misses a tenth of the motion lacks a part of it."""
 ANSWERS_NAMED: Final = 5
 """Maximum number of likely answers in a sentence. Judgement."""
@@ -31,7 +32,7 @@ class Doubt:
 
     Args:
         kind: ``held out``, ``ahead``, ``patched``, ``under load``, ``left`` or ``elsewhere``, as in `Predictions`.
-        share: that was found, a fraction; None where the place is in doubt.
+        share: the share found, a fraction; None for a doubt about the place.
     """
 
     kind: str
@@ -54,25 +55,25 @@ _DOUBTS: Mapping[str, Callable[[float], str]] = {
     ),
     "patched": lambda found: f"{_little(found)} of the gap when written into the model and simulated",
     "under load": lambda found: (
-        f"leaves {share(found)} of the gap, as friction under load does where it follows another law"
+        f"leaves {share(found)} of the gap: friction under load may follow another law"
     ),
     "left": lambda found: f"leaves a residual of {share(found)} of the swing",
     "elsewhere": lambda _: "the residuals point elsewhere",
 }
-"""Reasons not to decide on the answer that fits best, by kind; each takes the share found."""
+"""Reasons for not deciding on the best-fitting answer, by kind; each takes the share found."""
 
 
 @dataclass(frozen=True)
 class Predictions:
-    """The success of the answer's predictions, beside its probability; None: not known, or nothing to predict.
+    """Success of the answer's predictions, beside its probability; None: not known, or nothing to predict.
 
     Args:
         held_out: share of the gap that it explains on held-out readings.
         ahead: share of the gap in the later half of driven runs that it explains, fitted to the earlier half.
         patched: share of the gap that the user's model explains, with the answer written into it.
-        under_load: share of the gap that friction under the load of an actuator leaves.
+        under_load: share of the gap that remains with friction that depends on an actuator's load.
         left: root mean square residual over the readings' root mean square about their mean, a ratio.
-        elsewhere: whether the residuals show a place at which none of its causes acts.
+        elsewhere: whether the residuals show a place at which no cause of the answer acts.
     """
 
     held_out: float | None = None
@@ -101,7 +102,7 @@ class Predictions:
 
 @dataclass(frozen=True)
 class Decision:
-    """The decision that the probabilities of the answers allow.
+    """The judgement whether an answer is decided, and what the likely answers have in common.
 
     Args:
         decided: whether the answer is probable enough, and its predictions leave no doubt.
@@ -109,7 +110,7 @@ class Decision:
         effects: effects common to the likely answers, with their probabilities.
         channels: channels on which all likely answers act, with their probabilities.
         unpredictive: the answer, where it is probable enough but its predictions leave a doubt; else empty.
-        doubts: the reasons for that.
+        doubts: the reasons for the doubt.
     """
 
     decided: bool
@@ -121,7 +122,7 @@ class Decision:
 
     @property
     def in_doubt_of_place(self) -> bool:
-        """Whether the residuals show another place than the causes of the answer."""
+        """Whether the residuals show a place at which the causes of the answer do not act."""
         return any(one.kind == "elsewhere" for one in self.doubts)
 
     def words(self, runs: str) -> str:
@@ -184,7 +185,7 @@ def decision(
     Args:
         answers: names joined by plus signs, ``none`` or ``unknown``, and probabilities, which sum to 1; the answer
             first.
-        predictions: of the first answer; they count where it names effects.
+        predictions: predictions of the first answer; they count where it names effects.
     """
     credible, together = [], 0.0
     for answer in sorted(answers, key=lambda given: -given[1]):
@@ -195,7 +196,7 @@ def decision(
     channel_of = {kind.name: kind.channel for kind in known_effects()}
     proper = {
         kind.name for kind in known_effects() if not issubclass(kind, BetweenRuns)
-    }  # runs differ by chance beside any of them
+    }  # chance differences of the runs may act beside any answer
     causes = [(set(effect.split(" + ")) & channel_of.keys(), value) for effect, value in answers]
     first, probable = answers[0][0], answers[0][1] >= chosen.decided_from
     names_effects = first not in ("none", "unknown")
@@ -214,7 +215,7 @@ def decision(
 
 
 def _common(held: Iterable[tuple[set[str], float]], least: float) -> dict[str, float]:
-    """Elements common to answers of ``least`` of the probability, with that probability, most probable first."""
+    """Elements common to answers with a total probability of ``least``, with it, most probable first."""
     found: dict[str, float] = {}
     for names, value in held:
         for name in sorted(names):

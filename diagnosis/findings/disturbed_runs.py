@@ -1,4 +1,4 @@
-"""Disturbed runs: the parts that are used, and remedies, in words."""
+"""Sentences on disturbed runs: the parts that are used, and remedies."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from diagnosis.search.disturbance import Disturbance
 
 
 def disturbed_words(found: Disturbance, *, no_gap: bool) -> str:
-    """A disturbed run, and how much of it is used.
+    """A sentence on a disturbed run and the part of it that is used.
 
     Args:
         no_gap: whether the runs show no gap without the disturbance.

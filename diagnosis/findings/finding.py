@@ -1,7 +1,7 @@
 """The types of a finding: its numbers, its words and tables, its figures and next steps, and the judgement.
 
-A finding is a frozen dataclass of typed fields with units, which are also its JSON. `Findings` has a field for it;
-that line is all that the document, its schema, the terminal, the report, the bench and notebooks need of it.
+A finding is a frozen dataclass of typed fields with units; they are also its JSON. Each finding is a field of
+`Findings`: the document, its schema, the terminal, the report, the bench and notebooks need no other entry.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Answered:
-    """The numbers from which a finding is found.
+    """The results from which a finding is computed.
 
     Args:
-        campaign: the measured one.
-        study: of the similar campaign, its causes confirmed.
+        campaign: the measured campaign.
+        study: study of the similar campaign, its causes confirmed.
         before: coefficients of the nominal model, by name, in the units of the measured campaign.
-        after: with the causes, by the same names.
+        after: coefficients with the causes, by the same names.
     """
 
     campaign: Campaign
@@ -47,9 +47,9 @@ class Picture:
 
     Args:
         name: unique among the figures of a page.
-        caption: below it.
-        description: its text alternative.
-        draw: matplotlib's figure; None where there is nothing to draw.
+        caption: text below the figure.
+        description: text alternative of the figure.
+        draw: function that returns matplotlib's figure; None where there is nothing to draw.
     """
 
     name: str
@@ -59,14 +59,14 @@ class Picture:
 
     @property
     def block(self) -> Figure:
-        """Its place in a section."""
+        """The figure as a block of a section."""
         return Figure(self.name, self.caption)
 
     def of(self, freedom: Freedom, names: Sequence[str]) -> Picture:
         """The figure in the words of a freedom.
 
         Args:
-            names: of the user's, which are kept.
+            names: the user's names, which are not translated.
         """
         if freedom is ANGLE:
             return self
@@ -87,7 +87,7 @@ class Finding:
 
     @classmethod
     def find(cls, answered: Answered) -> Self | None:
-        """The finding; None where these runs give none."""
+        """Compute the finding; None where the runs do not give one."""
         raise NotImplementedError
 
     def section(self, judged: Judged) -> Section:
@@ -101,7 +101,7 @@ class Finding:
 
 
 class Judged(Protocol):
-    """The judgement of a diagnosis in plain values: all that the words of a finding know beside its own fields."""
+    """The judgement of a diagnosis in plain values, for the words of a finding beside its own fields."""
 
     @property
     def campaign(self) -> str:
@@ -153,7 +153,7 @@ class Judged(Protocol):
 
     @property
     def set_out(self) -> str:
-        """The name of the answer whose parameters are stated, such as ``most probable answer``."""
+        """The name of the answer that supplies the stated parameters, such as ``most probable answer``."""
 
     @property
     def cycling(self) -> bool:
@@ -165,7 +165,7 @@ class Judged(Protocol):
 
     @property
     def rest_is_material(self) -> bool:
-        """Whether it may move a coefficient."""
+        """Whether the remaining gap may move a coefficient."""
 
 
 @dataclass(frozen=True)
@@ -173,8 +173,8 @@ class NextStep:
     """A step for the rig.
 
     Args:
-        what: to do, a sentence without its full stop.
-        gain: of the step, a clause such as ``removes 98 % of the gap``; empty where the step says so itself.
+        what: the thing to do, a sentence without its full stop.
+        gain: gain of the step, a clause such as ``removes 98 % of the gap``; empty where ``what`` contains it.
     """
 
     what: str

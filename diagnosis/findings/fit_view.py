@@ -37,7 +37,7 @@ class Curves:
         time: s, shape (n,).
         reading: in ``unit``, shape (n,).
         before: residuals of the nominal model, in ``unit``, shape (n,).
-        after: residuals with the causes, in ``unit``, shape (n,); NaN where nothing was added.
+        after: residuals with the causes, in ``unit``, shape (n,); NaN where no cause was added.
         differ: the cycles in which the models differ most, s.
     """
 
@@ -79,8 +79,8 @@ def fitted_runs(maps: Maps | None, ids: Sequence[str] = ()) -> list[Curves]:
 def fit_figure(maps: Maps | None, ids: Sequence[str] = ()) -> Figure | None:
     """The fit over the data of the first two of `fitted_runs`; None without runs.
 
-    A column for each run: the whole record, with the cycles marked in which the models differ most; the reading in
-    these cycles with the predictions of both models; and their residuals.
+    A column for each run: the whole record, with a mark at the cycles in which the models differ most; the
+    reading in these cycles with the predictions of both models; and their residuals.
     """
     runs = fitted_runs(maps, ids)[:_COLUMNS]
     return _drawn(runs) if runs else None

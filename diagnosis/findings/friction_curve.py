@@ -32,13 +32,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class FrictionPoint:
-    """The friction of the strokes of similar rates, from their energy losses.
+    """The mean friction of strokes with similar rates, from their energy losses.
 
     Args:
-        rate_rad_s: mean over the distance, rad/s.
-        moment: mean of the strokes, in the unit of the curve.
-        std: its standard error by their scatter, in that unit.
-        strokes: their number.
+        rate_rad_s: mean rate over the distance, rad/s.
+        moment: mean moment of the strokes, in the unit of the curve.
+        std: standard error of the moment by the scatter of the strokes, in that unit.
+        strokes: number of strokes.
     """
 
     rate_rad_s: float
@@ -52,13 +52,13 @@ class FrictionCurve:
     """The friction of an effect against the rate.
 
     Args:
-        effect: its name.
-        unit: of the moments: N m, or rad/s² per unit inertia.
+        effect: name of the effect.
+        unit: unit of the moments: N m, or rad/s² per unit inertia.
         rate_rad_s: ascending, rad/s.
-        moment: of the fitted law, at these rates, in the unit.
+        moment: moment of the fitted law at these rates, in the unit.
         std: its standard deviation by the covariance of the fit, in the unit.
-        points: by the energy balance, of ascending rates; none where the records give none.
-        per_load: further friction per moment carried by the joint, dimensionless; law and points are without it.
+        points: points by the energy balance, of ascending rates; none where the records give none.
+        per_load: further friction per moment carried by the joint, dimensionless; excluded from law and points.
     """
 
     effect: str
@@ -84,11 +84,11 @@ class FrictionCurve:
         return (Picture("friction", caption, description, partial(friction_figure, self)),)
 
 
-_PLACES = 80  # of the curve
-_BELOW = 0.5  # of the least rate among the points: where the curve begins
-_BINS = 12  # of equal ratios of rates, at most
-_RATIO = 1.15  # of the rates in a bin, at least
-_NOISE = 10.0  # standard deviations of the noise that a stroke travels, at least: a reversal is then no noise
+_PLACES = 80  # number of points of the curve
+_BELOW = 0.5  # share of the least rate among the points at which the curve begins
+_BINS = 12  # maximum number of bins
+_RATIO = 1.15  # minimum ratio of the ends of a bin
+_NOISE = 10.0  # minimum length of a stroke in standard deviations of the noise: shorter ones are noise
 _PEAK = 0.5 * np.pi  # greatest rate of a swing over the mean of its rate over the time
 
 
@@ -168,9 +168,9 @@ class _Passed:
     """The strokes of a run.
 
     Args:
-        rate: mean over the distance, rad/s, shape (n,).
+        rate: mean rate over the distance, rad/s, shape (n,).
         missed: their energy loss beyond the fitted model, J, shape (n,).
-        error: standard deviation of the energy at every reversal by the noise, J, shape (n + 1,).
+        error: standard deviation of the energy at every reversal due to the noise, J, shape (n + 1,).
     """
 
     rate: Array
@@ -180,7 +180,7 @@ class _Passed:
 
 
 def _strokes(fit: Fit) -> list[_Passed]:
-    """The strokes of every run that has some.
+    """The strokes of every run that has any.
 
     A stroke's loss in the records differs from its loss in the fitted model by the error of the friction law. All
     other losses are equal in both, as are the errors of the reversals.
@@ -212,7 +212,7 @@ def _mean_rates(angle: Array, time: Array, turns: NDArray[np.int64]) -> Array:
 def _binned(runs: Sequence[_Passed], effect: Effect) -> list[FrictionPoint]:
     """The friction by bins of equal ratios of the rates.
 
-    Strokes that follow each other share a reversal, whose error cancels in their sum: they count as one.
+    Consecutive strokes share a reversal, and its error cancels in their sum: they count as one.
     """
     rates = np.concatenate([one.rate for one in runs])
     bins = int(np.clip(np.log(rates.max() / rates.min()) / np.log(_RATIO), 1.0, _BINS))
@@ -234,7 +234,7 @@ def _binned(runs: Sequence[_Passed], effect: Effect) -> list[FrictionPoint]:
 
 
 def _point(group: Array) -> FrictionPoint:
-    """The mean by the inverse variances; its error is the larger of the noise's and the scatter's."""
+    """The mean weighted by inverse variances; its error is the larger of the noise's and the scatter's."""
     rate, moment, error, count = group.T
     weight = np.maximum(error, 1e-300) ** -2.0
     total, mean = float(weight.sum()), float(weight @ moment / weight.sum())

@@ -1,4 +1,4 @@
-"""The answer in four lines: what is wrong, how sure that is, what it costs, and what to do first."""
+"""The answer in four lines: the fault, its probability, its cost, and the first remedy."""
 
 from __future__ import annotations
 
@@ -43,10 +43,10 @@ class Head:
     """The head of an answer.
 
     Args:
-        what: is wrong.
-        sure: how sure that is, and the next likely answer.
+        what: the fault.
+        sure: the probability of the answer, and the next likely answer.
         costs: the coefficients with 95 % intervals, and their values without the causes.
-        first: the step that buys most, with its gain.
+        first: the step with the largest gain.
         warnings: caveats that may change the answer.
         kind: ``none``, ``unknown``, ``open`` or ``found``.
     """
@@ -117,7 +117,7 @@ def _what(answer: Findings) -> str:
     return f"{words}{', which explain only part of the gap' if answer.rest_is_material else ''}{odd}"
 
 
-_MOST_SIZED = 3  # causes: more are named without their sizes
+_MOST_SIZED = 3  # maximum number of causes named with their sizes
 
 
 def _sized(answer: Findings, name: str) -> str:
@@ -127,7 +127,7 @@ def _sized(answer: Findings, name: str) -> str:
 
 
 def _called(answer: Findings, name: str) -> str:
-    """A cause as in the first line, without its size."""
+    """A cause without its size, as in the first line."""
     return _sized(answer, name).partition(" of ")[0]
 
 
@@ -203,7 +203,7 @@ _COUNTS = 0.005  # probability that is shown as 1 %
 
 
 def _against(other: Candidate, first: Candidate) -> str:
-    """Another answer, by its difference from the first where it contains or lacks some of its effects."""
+    """Another answer; by its difference from the first answer where they share effects."""
     mine, theirs = set(first.effect.split(" + ")), set(other.effect.split(" + "))
     if theirs > mine:
         return f"{plain(*sorted(theirs - mine))} as well"
@@ -239,7 +239,7 @@ def _costs(answer: Findings) -> str:
     return f"{stated}{_further(answer)}" if answer.decided else f"Over the likely answers: {stated}"
 
 
-_MOST_STATED = 3  # coefficients
+_MOST_STATED = 3  # maximum number of coefficients
 
 
 def _coefficient(one: Quantity, before: Quantity | None) -> str:
@@ -253,7 +253,7 @@ def _coefficient(one: Quantity, before: Quantity | None) -> str:
     return f"{text}{unit} instead of {before.value:.{places}f}"
 
 
-_UNCHANGED = 0.005  # of a coefficient: a smaller change is none to a customer
+_UNCHANGED = 0.005  # share of a coefficient: a smaller change does not matter to a customer
 
 
 def _further(answer: Findings) -> str:

@@ -1,12 +1,13 @@
 """Upper limits on undetected effects: the largest size of every effect that the runs do not exclude.
 
-An effect too small to be named still changes the coefficients, since the fit absorbs a part of it. The change at
-the largest size stands beside the coefficients and is not part of their intervals: Cnr without a named lag is the
-derivative in phase with the rate (decision 0004), to which a lag contributes, and an effect that the runs do not
-show is as likely to be absent.
+An effect too small to be named still changes the coefficients, since the fit absorbs a part of it. The change
+at the largest size is stated beside the coefficients and is not part of their intervals. First, Cnr without a
+named lag is the derivative in phase with the rate (decision 0004), to which a lag contributes. Second, an
+effect that the runs do not show is as likely to be absent.
 
-Linear theory proposes a size. A refit with the effect held at it confirms the limit or corrects it: a lag shows by
-its second order alone, and chance differences between the runs absorb a part of it that linear theory ignores.
+Linear theory proposes a size. A refit with the effect held at this size confirms the limit or corrects it.
+Linear theory alone may be wrong: a lag shows by its second order only, and chance differences between the runs
+absorb a part of an effect.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ HIDDEN_STDS: Final = 2.0
 """Distance of the upper limit of an undetected effect from its most probable size, in standard deviations.
 Convention."""
 HIDDEN_ABSORBED: Final = 0.0001
-"""Unabsorbed share of a change below which the runs do not show the effect. Judgement. The accuracy of linear
+"""Minimum unabsorbed share of a change for the runs to show the effect. Judgement. The accuracy of linear
 theory."""
 
 
@@ -52,12 +53,12 @@ class Hidden:
     """An effect that is not named, at the largest size that the runs do not exclude.
 
     Args:
-        effect: its name.
-        parameter: name of its severity.
-        size: that parameter, of the sign that allows more, with its unit; not determined where no refit confirms
-            a limit.
+        effect: name of the effect.
+        parameter: name of the severity.
+        size: value of that parameter, with the sign that allows the larger size, with its unit; not determined
+            where no refit confirms a limit.
         moves: by coefficient, the size of its change by the effect, with its unit; empty without a limit.
-        significance: standard deviations by which its likeliest size differs from zero, a ratio.
+        significance: most likely size over its standard deviation, a ratio.
     """
 
     effect: str
@@ -67,24 +68,25 @@ class Hidden:
     significance: float = 0.0
 
 
-def hidden_effects(fit: Fit, starts: Starts, left: Sequence[Array] | None = None) -> tuple[Hidden, ...]:
-    """Upper limits on effects beside the fitted ones, two standard deviations from the likeliest size.
+def hidden_effects(fit: Fit, starts: Starts, residuals: Sequence[Array] | None = None) -> tuple[Hidden, ...]:
+    """Upper limits on effects beside the fitted ones, two standard deviations from the most likely size.
 
-    The change of the readings that the other parameters cannot absorb is a polynomial in the size: of second order
-    where the effect states that its first order is absorbed, else of first order. χ² at every size follows from
-    that, and so does the range of sizes within four units of the least χ². A unit is the dispersion of the misfit
-    (`diagnosis.answer.linear_theory.beside`), 1 where only noise remains. Refits confirm the size (`_confirmed`).
+    The part of the change that the other parameters cannot absorb is a polynomial in the size: of second order
+    where the effect states that its first order is absorbed, else of first order. The polynomial gives χ² at
+    every size, and the range of sizes within four units of the least χ². A unit is the dispersion of the misfit
+    (`diagnosis.answer.linear_theory.beside`); it is 1 where only noise remains. Refits confirm the size
+    (`_confirmed`).
 
     Args:
-        fit: with or without effects.
+        fit: the fit of the answer, with or without effects.
         starts: the effects that may act beside the fitted ones.
-        left: scaled residuals for the dispersion, by run, where small causes beside the fit explain a part of its
-            own; each of shape (n,).
+        residuals: scaled residuals for the dispersion, by run, where small causes beside the fit explain a part of
+            the fit's residuals; each of shape (n,).
 
     Returns:
-        In the given order, without effects that the runs cannot show.
+        In the given order, without the effects that the runs cannot show.
     """
-    total = fit.total if left is None else sum(float(r @ r) for r in left)
+    total = fit.total if residuals is None else sum(float(r @ r) for r in residuals)
     beyond = max(total - fit.count - DISPERSION_STDS * np.sqrt(2.0 * fit.count), 0.0)
     reach = HIDDEN_STDS**2 * (1.0 + beyond / MISFIT_DEGREES)
     names, influence = coefficients_of(fit), influences(fit)
@@ -113,24 +115,25 @@ def hidden_effects(fit: Fit, starts: Starts, left: Sequence[Array] | None = None
     return tuple(hidden)
 
 
-def _confirmed(fit: Fit, start: StartingPoint, found: _Size, reach: float) -> _Size | None:
-    """The size at which a refit is ``reach`` above the least −2 ln L, with its changes of the coefficients.
+def _confirmed(fit: Fit, start: StartingPoint, linear: _Size, reach: float) -> _Size | None:
+    """The size at which a refit is ``reach`` above the least −2 ln L, with the changes of the coefficients.
 
-    A refit within a tenth of the rise confirms a size, and so does one beyond it that is close to one within.
-    Elsewhere the next size follows from those already refitted (`_nearer`). An effect with a phase or an instant in
-    every run keeps its size by linear theory: its change is a sum of lines or steps, linear in the size.
+    A refit confirms a size if its rise is within a tenth of ``reach``. A refit beyond that confirms it too if a
+    size close to it lies within. Otherwise the next size follows from the sizes already refitted (`_nearer`).
+    An effect with a phase or an instant in every run keeps its size by linear theory: its change is a sum of
+    lines or steps, linear in the size.
 
     Returns:
         None where no refit confirms a size, or the runs exclude no size at all.
     """
     assert start.scaled is not None
     if start.point.per_run.shape[1] > fit.point.per_run.shape[1]:
-        return found
-    limit = fit.unlikelihood - found.lowered
+        return linear
+    limit = fit.unlikelihood - linear.lowered
     least, greatest = sorted(one[start.scaled] for one in start.problem.bounds)
     size = float(
-        np.clip(found.size, least, greatest)
-    )  # a multiple of a trial may be rounded beyond its bound
+        np.clip(linear.size, least, greatest)
+    )  # a multiple of a trial may exceed its bound by rounding
     known: list[tuple[float, float]] = []
     along = np.zeros_like(fit.point.common)  # change of the other parameters per unit of the size
     for _ in range(_REFITS):
@@ -142,7 +145,7 @@ def _confirmed(fit: Fit, start: StartingPoint, found: _Size, reach: float) -> _S
         within = max((abs(one) for one, root in known if root < 1.0), default=0.0)
         if abs(rise - 1.0) <= _CONFIRMED or (rise > 1.0 and within < abs(size) < _CLOSE * within):
             return replace(
-                found,
+                linear,
                 size=size,
                 moves=_changes(fit, start, np.insert(again.point.common, start.scaled, size)),
             )
@@ -150,7 +153,7 @@ def _confirmed(fit: Fit, start: StartingPoint, found: _Size, reach: float) -> _S
             along = (again.point.common[: along.size] - fit.point.common) / size
         known.append((size, float(max(rise, _LEAST_RISE) ** (0.25 if start.second_order else 0.5))))
         further = float(np.clip(_nearer(known), least, greatest))
-        if further == size:  # the whole range is allowed
+        if further == size:  # all sizes of the range are allowed
             return None
         size = further
     return None
@@ -159,7 +162,7 @@ def _confirmed(fit: Fit, start: StartingPoint, found: _Size, reach: float) -> _S
 def _nearer(known: Sequence[tuple[float, float]]) -> float:
     """The size at which the root of the rise is 1, from sizes and their roots, by the secant.
 
-    The rise is a parabola about the likeliest size, so its root is a line.
+    The rise is a parabola about the most likely size, so its root is a line.
     """
     size, root = known[-1]
     inside = max((one for one in known if one[1] < 1.0), key=lambda one: abs(one[0]), default=None)
@@ -176,10 +179,10 @@ def _nearer(known: Sequence[tuple[float, float]]) -> float:
 
 
 def _held(fit: Fit, start: StartingPoint, size: float, common: Array) -> Fit | None:
-    """The fit with an effect held at a size, its other parameters free; None where it fails.
+    """The fit with an effect held at a size and its other parameters free; None where it fails.
 
     Args:
-        common: parameters of the given fit at which it starts, shape (common,).
+        common: starting values, common parameters of the given fit, shape (common,).
     """
     assert start.scaled is not None
     name, problem = start.problem.names[start.scaled], start.problem
@@ -204,43 +207,44 @@ def _changes(fit: Fit, start: StartingPoint, there: Array) -> Array:
 
 
 _REFITS = 10
-_STEPS = 10  # of a refit, which starts at the fit
-_TOLERANCE = 1e-6  # of its χ², so that rises of a few units compare
+_STEPS = 10  # iterations of a refit, which starts at the fit
+_TOLERANCE = 1e-6  # tolerance of its χ², small enough to compare rises of a few units
 _CONFIRMED = 0.1  # greatest distance of a rise from the limit's rise, as a share of the latter
-_CLOSE = 1.1  # greatest factor from a size within the limit to one beyond it that confirms it
+_CLOSE = 1.1  # maximum ratio of a size beyond the limit to one within it, for both to confirm the limit
 _WIDEST = 10.0  # greatest factor between two sizes that are refitted
 _LEAST_RISE = 1e-3  # as a share of the limit's rise
 
 
 @dataclass(frozen=True, eq=False)
 class _Size:
-    """The largest size of an effect that is not excluded."""
+    """The largest size of an effect that the runs do not exclude."""
 
     size: float
-    moves: Array  # of the coefficients there, shape (coefficients,)
-    drop: float  # of χ² at the likeliest size, less the chance gain of parameters per run
-    lowered: float  # drop of χ² at the likeliest size
+    moves: Array  # moves of the coefficients there, shape (coefficients,)
+    drop: float  # least χ², less the chance gain of parameters per run
+    lowered: float  # drop of χ² at the most likely size
 
 
 def _largest(fit: Fit, start: StartingPoint, influence: Sequence[Array], reach: float) -> _Size | None:
     """The largest size of an effect within ``reach`` of the least χ², and the moves of the coefficients there.
 
-    Higher orders spoil the first order of a polynomial that is fitted far from the size. Where the first order is
-    absorbed, it is therefore fitted again at the size found.
+    A polynomial fitted far from the size contains higher orders in its first order. Where the first order is
+    absorbed, the polynomial is therefore fitted again at the size found.
     """
     if start.scaled is None:
         return None
-    found = None
+    limit = None
     for number in range(_ROUNDS if start.second_order else 1):
         size = float(start.point.common[start.scaled])
-        # at a trial's size, a small share means that the runs cannot show the effect; later the size is small
-        found = _within(fit, start, influence, reach, HIDDEN_ABSORBED if number == 0 else 0.0)
-        if found is None or found.size == 0.0 or 1.0 / _SETTLED < found.size / size < _SETTLED:
+        # at a trial's size, a small share means that the runs cannot show the effect; at later sizes it may
+        # be small
+        limit = _within(fit, start, influence, reach, HIDDEN_ABSORBED if number == 0 else 0.0)
+        if limit is None or limit.size == 0.0 or 1.0 / _SETTLED < limit.size / size < _SETTLED:
             break
         common = start.point.common.copy()
-        common[start.scaled] = found.size
+        common[start.scaled] = limit.size
         start = replace(start, point=replace(start.point, common=common))
-    return found
+    return limit
 
 
 def _within(
@@ -257,10 +261,10 @@ def _within(
     if any(one is None for one in seen):
         return None
     changes, lefts, moves = zip(*(one for one in seen if one is not None), strict=True)
-    # change(k) = k u + k² w in multiples k of the size, and what is left of it and the moves alike
+    # change(k) = k u + k² w at k times the size; the unabsorbed part and the moves have the same form
     powers = np.array([[part, part**2][: len(parts)] for part in parts])
     terms, left, slopes = (np.linalg.solve(powers, np.array(of)) for of in (changes, lefts, moves))
-    # with the change itself, so that the prior of the runs' deviations counts as well
+    # together with the change itself, so that the prior of the runs' deviations counts
     along, gram = terms @ np.concatenate(fit.residuals), terms @ left.T
     rise: Array = np.zeros(5)  # χ²(k) − χ²(0), from the fourth power of k down
     for i in range(len(terms)):
@@ -284,16 +288,16 @@ def _real_roots(polynomial: Array) -> list[float]:
 
 
 _ROUNDS, _SETTLED = 6, 1.5  # rounds, and the factor by which the last one may still change the size
-_LEAST_PART = 1e-3  # least step towards a trial, as a share of it
-_REAL = 1e-6  # share of a root that its imaginary part may be
+_LEAST_PART = 1e-3  # least step towards a trial, as a share of the step to it
+_REAL = 1e-6  # maximum imaginary part of a root, as a share of the root
 
 
 def _moved(fit: Fit, start: StartingPoint, there: Array) -> Array:
     """Change of a fit's coefficients with an effect beside it, shape (coefficients,).
 
     Args:
-        there: the common parameters of the start's problem, shape (common,). Where a trial of gravity is so large
-            that nothing would swing, a part of that step is evaluated.
+        there: the common parameters of the start's problem, shape (common,). If a trial of gravity is so large
+            that nothing would swing, the change is computed from a fraction of the step.
     """
     assert start.scaled is not None
     model, names = fit.problem.data.model, start.problem.names
@@ -313,13 +317,13 @@ def _moved(fit: Fit, start: StartingPoint, there: Array) -> Array:
 def _profiled(
     fit: Fit, start: StartingPoint, part: float, influence: Sequence[Array], least_share: float
 ) -> tuple[Array, Array, Array] | None:
-    """The change of all readings by a part of an effect's size, what the fit cannot absorb of it, and its moves.
+    """The change of all readings by a part of an effect's size, its unabsorbed part, and its moves.
 
-    The other parameters are moved first. Linear theory alone would absorb to first order what they absorb exactly,
-    as Cnβ and Cnr absorb an offset of the only wind speed.
+    The other parameters are moved first: some absorb a change exactly, as Cnβ and Cnr absorb an offset of the
+    only wind speed, and linear theory alone would absorb it to first order only.
 
     Returns:
-        The change and the rest, scaled, each of shape (n,), and the moves of the coefficients, shape
+        The change and its unabsorbed part, scaled, each of shape (n,), and the moves of the coefficients, shape
         (coefficients,); None where the unabsorbed share of the change is at most ``least_share``.
     """
     assert start.scaled is not None

@@ -1,8 +1,8 @@
-"""A delay of the input that a wrong hold between samples would explain too: one cause with two readings.
+"""A delay of the input that a wrong hold between samples would explain as well.
 
-An input held between samples acts as one that is linear between them and half a sample late, except for terms of
-second order in the sample interval. A fit with the other hold and without a delay shows whether the records
-distinguish them.
+An input held between samples acts like an input that is linear between them and half a sample late, except for
+terms of second order in the sample interval. A fit with the other hold and without a delay tests whether the
+records distinguish the two.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ class OtherHold:
     """A delay of the input that another hold between its samples explains as well.
 
     Args:
-        delay_s, half_sample_s: s.
-        taken: the hold of the fits.
-        stated: whether the campaign states it for all driven runs.
-        better: whether the other hold explains the records better than chance would.
+        delay_s, half_sample_s: delay, and half a sample interval, s.
+        taken: the hold that the fits assume.
+        stated: whether the campaign states this hold for all driven runs.
+        better: whether the other hold explains the records better, beyond chance.
     """
 
     delay_s: float
@@ -42,8 +42,8 @@ DELAY = the_effect(InputClock)
 
 
 def other_hold(study: Study) -> OtherHold | None:
-    """The delay of an answer that another hold explains as well; None where there is none."""
-    from scipy.special import chdtri  # only here: slow to load
+    """The delay of an answer that another hold explains as well; None if there is no such delay."""
+    from scipy.special import chdtri  # imported here because it is slow to load
 
     fit, problem = study.chosen, study.chosen.problem
     inputs = {drive.held for drive in problem.data.inputs}

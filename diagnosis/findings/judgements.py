@@ -22,7 +22,7 @@ from identification.show.quantity import Quantity
 from tunnel_sim.vocabulary.campaign import Campaign
 
 RUNS_WITHOUT_CAUTION: Final = 3
-"""Number of runs below which a caution is given. Judgement."""
+"""Number of runs below which a caveat is given. Judgement."""
 NOISE_CONTRADICTED: Final = 3.0
 """Error factor of the stated noise above which a caution is given. Judgement. Rounding to one digit can cause
 half of it."""
@@ -32,19 +32,19 @@ hand to one mark scatter by a few per cent."""
 NEARLY_EXPLAINS: Final = 0.8
 """Minimum share of an unexplained gap that effects must explain to be mentioned. Judgement."""
 NEARLY_ALIKE: Final = 0.02
-"""Maximum shortfall of a rival that explains as much. Judgement."""
+"""Maximum difference of the shares that two rivals explain for both to count as equal. Judgement."""
 NEARLY_RIVAL: Final = 0.5
-"""Minimum probability of that rival, relative to the mentioned effects, to be the reason for naming none.
-Judgement."""
+"""Minimum probability of such a rival, relative to the mentioned effects, for it to be the reason that none is
+named. Judgement."""
 NEARLY_MISFIT_STDS: Final = 2.0
-"""Margin of χ² of a channel over its expectation above which its misfit is the reason for naming none, in
-standard deviations. Convention."""
+"""Margin of a channel's χ² over its expectation above which the channel's misfit is the reason that no effect
+is named, in standard deviations. Convention."""
 IMMATERIAL: Final = 0.01
 """Maximum relative change of the coefficients by an immaterial gap. Convention. Derivatives are quoted to one
 per cent."""
 ZEROS_CLOSE: Final = 0.5
-"""Minimum share of an unexplained gap that a zero per run must explain to be mentioned. Convention. Most of
-it."""
+"""Minimum share of an unexplained gap that a free zero in every run must explain to be mentioned. Convention.
+Most of the gap."""
 
 
 @dataclass(frozen=True)
@@ -53,10 +53,10 @@ class Nearly:
 
     Args:
         closes: share of the gap in the fitted runs, a fraction.
-        probability: of being the answer, a fraction.
-        noisy: whether misbehaving noise may be the whole gap.
-        rival: effects that explain as much; empty where there are none.
-        rival_probability: of those, a fraction.
+        probability: probability of the effects being the answer, a fraction.
+        noisy: whether the gap may be irregular noise alone.
+        rival: effects that explain as much; empty if there are none.
+        rival_probability: probability of the rival, a fraction.
         misfit: channels with a significant misfit.
     """
 
@@ -70,7 +70,7 @@ class Nearly:
 
     @property
     def words(self) -> str:
-        """The effects that explain most of a gap without being named, and the reason."""
+        """The effects that explain most of a gap but are not named, and the reason."""
         said = f"{plain(*self.effects).capitalize()} would explain {share(self.closes)} of the gap"
         if self.noisy:
             return f"{said}, but irregular noise may explain a gap this small."
@@ -99,7 +99,7 @@ def cautions(
     """The caveats of an answer.
 
     Args:
-        runs: the gap by run, with whether the run could be held out of the fit.
+        runs: the gap by run, and whether the run could be held out of the fit.
         confirmation: whether the fits' integrator agrees with the MuJoCo model.
         named: whether the answer names effects; only then are runs held out of a fit.
     """
@@ -143,7 +143,7 @@ def outside_the_fits(study: Study) -> tuple[Fact, ...]:
 
 
 def one_amplitude(study: Study) -> tuple[Fact, ...]:
-    """The fact that all runs have one release amplitude, for free forms; empty without these or with several."""
+    """The fact that all runs have one release amplitude while forms are free; empty without free forms."""
     problem = study.chosen.problem
     runs, names = problem.data.runs, problem.free_forms
     if problem.data.driven or not names or not study.named:
@@ -156,11 +156,11 @@ def one_amplitude(study: Study) -> tuple[Fact, ...]:
 
 
 def zeros_apart(study: Study) -> tuple[Fact, ...]:
-    """The fact that a zero per run would explain most of an unexplained gap; empty where it would not."""
+    """The fact that a free zero in every run would explain most of an unexplained gap; empty where it would not."""
     nominal, chosen = study.nominal, study.settings.words
     if nominal.problem.data.model.own_zeros or study.campaign.sensor.zero == "common":
         return ()
-    # a zero of its own removes exactly the mean of a run
+    # a free zero removes exactly the mean of a run
     means = np.array([float(left.sum()) ** 2 / left.size for left in nominal.residuals])
     whole = float(sum(left @ left - left.size for left in nominal.residuals))
     by_chance = float(chdtrc(means.size, means.sum()))
@@ -171,7 +171,7 @@ def zeros_apart(study: Study) -> tuple[Fact, ...]:
 
 
 def nearly(study: Study) -> Nearly | None:
-    """The effects that explain most of a gap without being named; None where there are none."""
+    """The effects that explain most of a gap but are not named; None if there are none."""
     sets = [answer for answer in study.answers if answer.effects not in ((), UNKNOWN)]
     first = max(sets, key=lambda answer: (answer.probability, -answer.share), default=None)
     if study.causes != UNKNOWN or first is None or first.share > 1.0 - NEARLY_EXPLAINS:

@@ -10,8 +10,8 @@ from diagnosis.where.maps import RunMap
 from identification.show.numbers import held_out_excess, reading_shown, significant, unit_shown
 
 NO_MISFIT = "none (within the noise)"
-"""A gap that is smaller than what chance adds to the noise."""
-_NONE = 5e-4  # noise variances: shown as 0.000
+"""Text for a gap below the level that chance adds to the noise."""
+_NONE = 5e-4  # excess in noise variances that is shown as 0.000
 
 
 @dataclass(frozen=True)
@@ -19,9 +19,9 @@ class Misfit:
     """Conversion from an excess, in noise variances of a sample, to a misfit.
 
     Args:
-        noise: standard deviation of one sample's noise, against which excesses are measured, in ``unit``.
+        noise: standard deviation of one sample's noise, the reference of the excess, in ``unit``.
         swing: root mean square of the readings about the mean of each run, in ``unit``.
-        unit: of the readings: ``rad``, ``rad/s`` or ``rad/s2``.
+        unit: unit of the readings: ``rad``, ``rad/s`` or ``rad/s2``.
     """
 
     noise: float
@@ -29,7 +29,7 @@ class Misfit:
     unit: str
 
     def rms(self, excess: float) -> float:
-        """Root mean square in ``unit``; an excess below zero is chance."""
+        """Root mean square misfit in ``unit``; zero for a negative excess, which is chance."""
         return self.noise * math.sqrt(max(excess, 0.0))
 
     def of_swing(self, excess: float) -> float | None:
@@ -46,7 +46,7 @@ class Misfit:
         return f"{significant(share, 2) if share else '0'} % of the swing"
 
     def words(self, excess: float, *, times: bool = False) -> str:
-        """A gap as a root mean square, or that there is none.
+        """A gap as a root mean square, or the statement that there is none.
 
         Args:
             times: adds the multiple of the noise variance, such as ``0.134° (19.34)``.

@@ -33,11 +33,11 @@ SEPARATED_BY: Final = 3.0
 """Minimum difference between two answers for a run to distinguish them, in standard deviations. Convention.
 Odds of about 100:1."""
 
-_ANGLES = (1.0, 0.4)  # of the largest swing of the runs
+_ANGLES = (1.0, 0.4)  # shares of the largest swing of the runs
 _DURATIONS = (10.0, 30.0)  # s
 _MOST_SPEEDS = 4
-_PHASES = 8  # of the true model's periodic effect, to average over
-_PHASES_TRIED = (1, 720, 72)  # of each of the rival's periodic effects (none, one or two), to fit
+_PHASES = 8  # phases of the true model's periodic effect, to average over
+_PHASES_TRIED = (1, 720, 72)  # phases of each of the rival's periodic effects (none, one or two), to fit
 
 
 @dataclass(frozen=True)
@@ -47,8 +47,8 @@ class PlannedRun:
     Args:
         spring_stiffness: Kr, N m/rad.
         wind_speed: V, m/s.
-        release_angle: from the rest, rad.
-        duration: of the record, s.
+        release_angle: angle from the rest, rad.
+        duration: length of the record, s.
     """
 
     spring_stiffness: float
@@ -57,7 +57,7 @@ class PlannedRun:
     duration: float
 
     def own(self, similarity: Similarity) -> Self:
-        """The run in the measured campaign's units, rounded to adjustable values."""
+        """The run in the measured campaign's units, rounded to values that can be set."""
         return dataclasses.replace(
             self,
             spring_stiffness=_adjustable(similarity.own(self.spring_stiffness, "N m/rad"), 0.01),
@@ -84,7 +84,7 @@ class PlannedRun:
 
 @dataclass(frozen=True)
 class NextRun(PlannedRun):
-    """The run for which the predictions of two models differ most.
+    """The run with the largest difference between the predictions of two models.
 
     Args:
         separation: expected difference of the predictions (see `separation`), in standard deviations of the noise.
@@ -94,13 +94,13 @@ class NextRun(PlannedRun):
 
     @classmethod
     def between(cls, first: Fit, second: Fit) -> NextRun | None:
-        """The run that separates two models, fitted to the same runs.
+        """The run that separates two models fitted to the same runs.
 
-        The rig can make it: its runs have the same springs, wind speeds and angles.
+        The rig can make the run: its spring, wind speed and angle are those of existing runs.
 
         Returns:
-            None where no stiffness is known, and where a free decay does not show the question: every run is
-            driven, or the models differ in an effect of the input.
+            None where no stiffness is known, or where a free decay cannot separate the models: every run is
+                driven, or the models differ in an effect of the input.
         """
         data = first.problem.data
         differ = set(first.problem.effects) ^ set(second.problem.effects)
@@ -142,8 +142,8 @@ class FurtherRuns(PlannedRun):
     """Equal runs that narrow a coefficient most, by their Fisher information in the model of the answer.
 
     Args:
-        count: of the runs.
-        left: by coefficient, the standard deviation by the noise of the readings with these runs, over the present.
+        count: number of runs.
+        left: by coefficient, the standard deviation due to noise with these runs, divided by the present one.
     """
 
     count: int
@@ -151,22 +151,22 @@ class FurtherRuns(PlannedRun):
 
     @classmethod
     def narrowing(cls, fit: Fit, after: Mapping[str, Quantity]) -> FurtherRuns | None:
-        """The runs that narrow the widest coefficient most, as few as bring its interval to `WIDE`.
+        """The runs that narrow the widest coefficient most, as few as narrow its interval to `WIDE`.
 
-        The rig can make them: its runs have the same springs, wind speeds and largest angle.
+        The rig can make the runs: their spring, wind speed and largest angle are those of existing runs.
 
         Args:
             after: the coefficients of the answer, in any units.
 
         Returns:
-            None where no coefficient is wide by the noise of the readings, no stiffness is known, every run is
-            driven, or the runs differ by chance: more of them then narrow a coefficient by their number.
+            None where the noise of the readings leaves no coefficient wide, no stiffness is known, every run is
+                driven, or the runs differ by chance: then only the number of runs narrows a coefficient.
         """
         data, runs = fit.problem.data, []
         wide = [name for name, one in after.items() if source_of_width(name, one) == "noise"]
         if not wide or fit.problem.scatter or not data.decays:
             return None
-        # a coefficient times unstated sizes is the fit's coefficient with other units
+        # a coefficient times unstated sizes is the fit's coefficient in other units
         names = data.model.coefficient_names(fit.problem.names)
         own = [next((one for one in after if f"{one}_".startswith(f"{name}_")), "") for name in names]
         widest = max(wide, key=lambda name: after[name].reach / abs(after[name].value))
@@ -191,30 +191,30 @@ class FurtherRuns(PlannedRun):
 
 
 WIDE: Final = 0.1
-"""Maximum reach of a 95 % interval that is not worth a step, as a share of the coefficient. Judgement."""
+"""Maximum half-width of a 95 % interval that needs no step, as a share of the coefficient. Judgement."""
 
 
 def source_of_width(name: str, given: Quantity) -> str:
-    """The source of most of a coefficient's variance where its 95 % interval is wide; else empty."""
+    """The largest source of a coefficient's variance if its 95 % interval is wide; else empty."""
     known = name != "moment_offset" and given.std and given.value and given.shares
     if not known or given.reach <= WIDE * abs(given.value):
         return ""
     return max(given.shares, key=given.shares.__getitem__)
 
 
-_COUNTS = (2, 4, 8)  # of further runs, to choose from
+_COUNTS = (2, 4, 8)  # numbers of further runs, to choose from
 
 
 def remaining(fit: Fit, runs: list[RunData], angle: float) -> Array:
-    """Standard deviations of the coefficients by the noise with further runs, of the present ones.
+    """Standard deviations of the coefficients due to noise with further runs, over the present ones.
 
     Args:
         runs: from `planned_run`.
-        angle: of the release, rad.
+        angle: release angle, rad.
 
     Returns:
-        By number of equal runs as in `_COUNTS`, run and coefficient, shape (counts, runs, coefficients); 1 where a
-        run cannot be integrated.
+        Ratios, shape (counts, runs, coefficients); counts as in `_COUNTS`. A ratio is 1 if its run cannot be
+        integrated.
     """
     problem, own = _planned(fit, tuple(runs), angle)
     found = sensitivities(problem, Point(fit.point.common, np.tile(own, (len(runs), 1))))
@@ -286,15 +286,15 @@ def separation(first: Fit, second: Fit, run: RunData, angle: float) -> float | N
     """Difference between two models' predictions of one run, after its own parameters are refitted.
 
     Args:
-        run: its conditions and length; its reading is not used.
-        angle: of the release, rad.
+        run: the conditions and the length of the run; its reading is not used.
+        angle: release angle, rad.
 
     Returns:
         The misfit of the rival in standard deviations of the noise, after its release and the phases of its
-        periodic effects are refitted, as the root mean square over the phases of the true model, which cannot be
-        chosen. Each model is taken as the true one in turn, and the smaller misfit counts. None where a model's
-        motion diverges. Half the square is the expected log-likelihood ratio of the run, in nats, if one of the
-        two models is right.
+        periodic effects are refitted. The phases of the true model cannot be chosen: the misfit is a root mean
+        square over them. Each model is taken as the true one in turn, and the smaller misfit counts. None where
+        a model's motion diverges. Half the square is the expected log-likelihood ratio of the run, in nats, if
+        one of the two models is right.
     """
     one, other = _predict(first, run, angle), _predict(second, run, angle)
     if one is None or other is None:
@@ -314,7 +314,7 @@ class _Prediction:
 def _predict(fit: Fit, run: RunData, angle: float) -> _Prediction | None:
     """Predict a run; None where it cannot be integrated.
 
-    The response to a periodic effect is of first order in its size, so that it rotates with its phase.
+    The response to a periodic effect is of first order in its size, so it rotates with the effect's phase.
     """
     problem, own = _planned(fit, (run,), angle)
     turns = _turning(problem)
@@ -336,7 +336,7 @@ def _predict(fit: Fit, run: RunData, angle: float) -> _Prediction | None:
 
 def _planned(fit: Fit, runs: tuple[RunData, ...], angle: float) -> tuple[Problem, Array]:
     """The problem of planned runs, and the values of a run's own parameters, shape (own,)."""
-    # one instant, whatever the number in existing runs, and no deviation: it may have either sign
+    # one instant, whatever the number in existing runs, and no deviation, since it may have either sign
     data = fit.problem.data.with_runs(runs)
     problem = dataclasses.replace(fit.problem, data=data, instants=1, scatter=())
     first = len(problem.parameters.own) - problem.parameters.of_effects

@@ -33,7 +33,7 @@ def next_steps(answer: Findings) -> list[str]:
 def steps(answer: Findings) -> list[NextStep]:
     """The next steps: the causes by their shares of the gap, then runs that narrow the answer and the coefficients.
 
-    Without a cause to act on, runs that do not count come first.
+    Without a cause to act on, the remedies for runs that are not used come first.
     """
     causes, decided = answer.causes, answer.decided
     runs = [*map(disturbed_step, answer.disturbed), *_remedies(answer.remarks)]
@@ -96,7 +96,7 @@ def _mending(answer: Findings) -> Iterator[NextStep]:
 
 
 def _part(parts: dict[str, tuple[float, str]], names: Sequence[str]) -> float:
-    """The share of the gap of several causes."""
+    """The share of the gap that several causes explain."""
     return sum(parts[name][0] for name in names if name in parts)
 
 
@@ -119,7 +119,7 @@ _REPEATED = {"wind_speed": "wind speed", "spring_stiffness": "stiffness", "mecha
 
 
 def _corrects(answer: Findings) -> str:
-    """The changes of the coefficients by the only cause, where they are of a per cent or more, after a blank."""
+    """The changes of the coefficients by the only cause, if they are at least a per cent, after a blank."""
     given, found = answer.coefficients, []
     for name, one in given.before.items():
         two = {**given.after, **given.in_phase}.get(name)
@@ -131,11 +131,11 @@ def _corrects(answer: Findings) -> str:
     return f" and corrects {listed(found)}" if found else ""
 
 
-_VISIBLE = 0.01  # of a coefficient: a smaller change is not worth a word
+_VISIBLE = 0.01  # share of a coefficient: a smaller change is not mentioned
 
 
 def _expected(answer: Findings) -> str:
-    """The expected result of a further diagnosis."""
+    """The expected result of the next diagnosis."""
     gap = answer.gap
     before, after = (gap.misfit.words(value) for value in (gap.excess_before, gap.excess_after))
     if answer.rest is None or not answer.rest_is_significant:
@@ -147,7 +147,7 @@ def _expected(answer: Findings) -> str:
 
 
 def run_to_make(answer: Findings) -> NextRun | None:
-    """The run that distinguishes the answers; None where none is proposed, or the best one would not."""
+    """The run that distinguishes the answers; None if no run is proposed, or the best one would not."""
     run = answer.next_run
     return run if run is not None and run.distinguishes() else None
 
@@ -216,7 +216,7 @@ def _deciding(answer: Findings) -> Iterator[NextStep]:
             f"decides between the likely answers{_narrower(answer, 'rivals')}",
         )
         return
-    # stated, and can be chosen
+    # a stiffness that is stated and can be chosen
     springs = not robot and not unplannable(answer) and answer.model is None
     kinds = ["springs"] * springs + ["wind speeds"] * answer.windy
     kinds += ["inputs" if answer.found.driven else "release angles"]
@@ -224,7 +224,7 @@ def _deciding(answer: Findings) -> Iterator[NextStep]:
 
 
 def _look(answer: Findings) -> NextStep:
-    """Where to look for an unknown cause."""
+    """The place in which to look for an unknown cause."""
     runs, place, channel = answer.where.runs, answer.found.place, answer.where.channel
     named = f", in {listed(list(runs))}" if place is not None and 0 < len(runs) < min(place.runs, 6) else ""
     what = "the rig" if channel is None else f"what acts on {CHANNELS[channel]}"
@@ -240,9 +240,9 @@ def _look(answer: Findings) -> NextStep:
 
 
 def _remedies(remarks: Sequence[Remark]) -> list[NextStep]:
-    """Remedies for runs that are left out or refused, or have wrong units, each once.
+    """Remedies for runs that are left out or refused, or have wrong units, each listed once.
 
-    A cut run is used and needs nothing.
+    A cut run is used and needs no remedy.
     """
     runs: dict[str, list[str]] = {}
     for remark in remarks:
@@ -252,7 +252,7 @@ def _remedies(remarks: Sequence[Remark]) -> list[NextStep]:
 
 
 def _narrowing(answer: Findings) -> Iterator[NextStep]:
-    """For each source of a wide interval, what narrows it, and the interval that would be left."""
+    """For each source of a wide interval, the step that narrows it, and the resulting interval."""
     runs, found = answer.further_runs, dict[str, list[str]]()
     for name, one in {**answer.coefficients.after, **answer.coefficients.in_phase}.items():
         source = source_of_width(name, one)
@@ -278,11 +278,12 @@ _NARROWS = {
 }
 """The steps on the rig that narrow an interval, by the source of most of its variance."""
 _CUT = {"noise": 0.75, "scatter": 0.75}
-"""Share of a source's variance that the step removes: four times the runs leave a quarter. Others: all at most."""
+"""Share of a source's variance that the step removes at most: three quarters with four times the runs, else
+all."""
 
 
 def _narrower(answer: Findings, source: str) -> str:
-    """The coefficient that gains most where a source of uncertainty goes; empty where none gains a third."""
+    """The coefficient that gains most where a source of uncertainty is removed; empty where none gains a third."""
     after = {name: one for name, one in answer.coefficients.after.items() if one.std and one.value}
     most = max(after, key=lambda name: after[name].shares.get(source, 0.0), default="")
     if not most or after[most].shares.get(source, 0.0) < _GAINS:
@@ -290,7 +291,7 @@ def _narrower(answer: Findings, source: str) -> str:
     return f"; {_becomes(most, after[most], after[most].shares[source])}"
 
 
-_GAINS = 0.55  # of a variance: without it the standard deviation falls by a third
+_GAINS = 0.55  # share of a variance: without it the standard deviation falls by a third
 
 
 def _becomes(name: str, given: Quantity, part: float) -> str:

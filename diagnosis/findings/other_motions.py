@@ -1,4 +1,4 @@
-"""Motions beyond effects of one degree of freedom: a second mode, and a limit cycle in every run."""
+"""Motions that no effect of one degree of freedom explains: a second mode; a limit cycle in every run."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ class Mode:
     """A decaying oscillation.
 
     Args:
-        amplitude_rad: at the start, rad.
+        amplitude_rad: amplitude at the start, rad.
         frequency_hz: Hz.
-        decay_per_s: rate of its decay, 1/s.
+        decay_per_s: decay rate, 1/s.
     """
 
     amplitude_rad: float
@@ -42,7 +42,7 @@ class Mode:
 
 @dataclass(frozen=True)
 class TwoModes:
-    """Two modes in a run, where a rig has one.
+    """Two modes in a run.
 
     Args:
         run: id of the run.
@@ -57,19 +57,20 @@ class TwoModes:
     closes: float
 
 
-_MOST = 1024  # thinned readings used: fifty cycles
+_MOST = 1024  # number of thinned readings used: fifty cycles
 _LEAST = 64
-_PARTS = (1.0, 0.5, 0.25)  # of these, from the start: a quickly decaying mode is lost in the whole
-_ROWS = 1.0 / 3.0  # of a Hankel matrix over the readings, as in the matrix pencil
+# parts of the record, from the start: in the whole record a quickly decaying mode is lost
+_PARTS = (1.0, 0.5, 0.25)
+_ROWS = 1.0 / 3.0  # rows of a Hankel matrix over the readings, as in the matrix pencil
 
 
 @dataclass(frozen=True, eq=False)
 class _Modes:
-    """Decaying oscillations whose sum is fitted to a reading."""
+    """The fit of a sum of decaying oscillations to a reading."""
 
     frequency: Array  # Hz, shape (m,)
-    rate: Array  # of decay, 1/s, shape (m,)
-    amplitude: Array  # at the first reading, rad, shape (m,)
+    rate: Array  # decay rate, 1/s, shape (m,)
+    amplitude: Array  # amplitude at the first reading, rad, shape (m,)
     left: float  # sum of squared residuals, rad²
 
 
@@ -77,10 +78,10 @@ def second_modes(campaign: Campaign) -> tuple[TwoModes, ...]:
     """Find a second mode in each run that shows one.
 
     Returns:
-        One for each run in which two decaying oscillations leave far less than one does, and are farther apart
-        than the sum of their half-power widths, harmonics of the motion excepted; over the whole run, its first
-        half or its first quarter. A motion that shows fewer than three cycles is not a mode. Driven runs are left
-        out.
+        One result for each run with a second mode. A second mode is found where two decaying oscillations leave
+        a much smaller residual than one, and their frequencies are farther apart than the sum of their
+        half-power widths; harmonics of the motion do not count. The whole run, its first half and its first
+        quarter are tried. A motion of fewer than three cycles is not a mode. Driven runs are left out.
     """
     modes = []
     for run in campaign.decays:
@@ -102,10 +103,10 @@ def second_modes(campaign: Campaign) -> tuple[TwoModes, ...]:
             resolution = float(two.rate.sum()) / np.pi
             lifetime = np.minimum(1.0 / np.maximum(two.rate, 1e-300), interval * values.size)
             if np.any(two.frequency * lifetime < SECOND_MODE_CYCLES):
-                continue  # an impulse or a drift, and no oscillation
+                continue  # an impulse or a drift, not an oscillation
             turns = max(1, round(two.frequency[order[1]] / two.frequency[order[0]]))
             if abs(two.frequency[order[1]] - turns * two.frequency[order[0]]) < resolution:
-                continue  # not resolved, or a harmonic of the motion
+                continue  # an unresolved frequency, or a harmonic of the motion
             main, second = (
                 Mode(float(two.amplitude[i]), float(two.frequency[i]), float(two.rate[i])) for i in order
             )
@@ -115,7 +116,7 @@ def second_modes(campaign: Campaign) -> tuple[TwoModes, ...]:
 
 
 def _fit_modes(values: Array, interval: float, count: int, vectors: Array) -> _Modes | None:
-    """A sum of ``count`` decaying oscillations by the poles of a Hankel matrix with these left singular vectors."""
+    """Fit ``count`` decaying oscillations by the poles of a Hankel matrix with these left singular vectors."""
     left = vectors[:, : 2 * count]
     poles = np.linalg.eigvals(np.linalg.pinv(left[:-1]) @ left[1:]).astype(np.complex128)
     exponents = np.asarray(np.log(poles[np.abs(poles) > 0.0]) / interval, np.complex128)

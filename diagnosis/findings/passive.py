@@ -1,4 +1,4 @@
-"""Damping of a passive rig within its physical bounds: not negative, and at most the whole rate of the motion."""
+"""The damping of a passive rig within its physical bounds: at least zero, at most the decay rate of the motion."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from diagnosis.likelihood.residuals import linear_coefficients
 from diagnosis.search.study import Study
 from identification.show.quantity import Quantity
 
-_WIDE = 30.0  # standard deviations over the allowed range from which the distribution in it is uniform
-_FAR = 6.0  # standard deviations within which the whole distribution lies
+_WIDE = 30.0  # standard deviations over the allowed range from which the distribution counts as uniform
+_FAR = 6.0  # standard deviations that contain the whole distribution
 
 
 @dataclass(frozen=True)
@@ -23,8 +23,8 @@ class Truncated:
     """A normal distribution within bounds.
 
     Args:
-        mean, std: of the distribution within them, in the quantity's unit.
-        interval: its central interval of 0.95, in the unit.
+        mean, std: mean and standard deviation within the bounds, in the quantity's unit.
+        interval: central interval of 0.95, in the unit.
     """
 
     mean: float
@@ -36,11 +36,11 @@ def truncated(value: float, std: float, lower: float, upper: float, probability:
     """A normal distribution within bounds, in the unit of all four.
 
     Args:
-        value: its mean without bounds, within them.
-        std: without bounds, above 0.
-        lower: least value.
-        upper: greatest value, above ``lower``.
-        probability: of the interval.
+        value: mean of the unbounded distribution, clipped to the bounds.
+        std: standard deviation of the unbounded distribution, above 0.
+        lower: lower bound.
+        upper: upper bound, above ``lower``.
+        probability: probability of the interval.
     """
     tail = 0.5 * (1.0 - probability)
     if std > _WIDE * (upper - lower):
@@ -62,11 +62,12 @@ def within_bounds(given: Mapping[str, Quantity], study: Study) -> dict[str, Quan
         given: the coefficients of the answer, by name.
 
     Returns:
-        The same. Where the deviation of ``zeta`` or ``mechanical_damping`` exceeds the bounds, the interval is that
-        of the distribution within them, and the standard deviation its root mean square distance from the value.
-        The damping is not negative. Beside named causes in free decays without wind it is at most the whole rate
-        of the fitted motion, since no such cause feeds the motion. Where the runs show only the sum of the damping
-        and of another loss, its distribution within the bounds is uniform, also where the fit ends at one of them.
+        The same coefficients. Where the deviation of ``zeta`` or ``mechanical_damping`` exceeds the bounds, the
+        distribution is truncated to them: the interval is the truncated distribution's, and the standard
+        deviation its root mean square distance from the value. The damping is not negative. Beside named causes
+        in free decays without wind it is at most the decay rate of the fitted motion, since no such cause feeds
+        the motion. Where the runs determine only the sum of the damping and another loss, the distribution
+        within the bounds is uniform, even if the fit ends at a bound.
     """
     found, chosen = dict(given), study.settings.answer
     if not study.named:
@@ -94,7 +95,7 @@ def within_bounds(given: Mapping[str, Quantity], study: Study) -> dict[str, Quan
 
 
 def _shared(fit: Fit) -> bool:
-    """Whether the runs leave open which share of a loss is the mechanical damping."""
+    """Whether the runs cannot separate the mechanical damping from another loss."""
     if fit.left_open is None or "mechanical_damping" not in fit.problem.names:
         return False
     place = fit.problem.names.index("mechanical_damping")
@@ -102,7 +103,7 @@ def _shared(fit: Fit) -> bool:
 
 
 def _greatest(study: Study, name: str) -> float | None:
-    """The whole rate of the fitted motion as a damping ratio or damping, with its uncertainty; None: not known."""
+    """The decay rate of the fitted motion as a damping ratio or damping, with its uncertainty; None: not known."""
     fit, data = study.chosen, study.chosen.problem.data
     if data.driven or data.wind_on or study.chosen is study.nominal:
         return None
@@ -117,7 +118,7 @@ def _greatest(study: Study, name: str) -> float | None:
     if any(kind.channel == "stiffness" for kind in fit.problem.effects):
         # the rate is ratio times frequency, and a stiffening spring raises the frequency of the swing
         ratio *= max(2.0 * inertia * frequency / critical, 1.0)
-    # the whole rate is known as well as the damping of the nominal model, in noise as large as the misfit
+    # the decay rate is as accurate as the nominal model's damping, in noise as large as the misfit
     reach = 2.0 * _std(study.nominal) * math.sqrt(1.0 + max(fit.excess, 0.0)) / critical
     whole = ratio + reach
     return whole if name == "zeta" else whole * critical

@@ -1,4 +1,4 @@
-"""The user's model with the causes: its changes, what it explains, and its own values that do not fit."""
+"""The user's model with the causes: its changes, the share it explains, and values that do not fit."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Convention."""
 FILE_OFF_SHARE: Final = 0.01
 """Maximum deviation of a coefficient, as a share, at which the value in the file fits. Judgement."""
 
-#: By attribute of the file: the fitted quantity, and the coefficient that it is a part of.
+#: By attribute of the file: the fitted quantity, and the coefficient to which it contributes.
 _FREE = {
     "joint armature": ("inertia", "yaw_inertia"),
     "joint damping": ("damping", "mechanical_damping"),
@@ -30,7 +30,7 @@ def corrected(model: PatchedModel | None, judged: Judged) -> list[tuple[WrittenA
     """The attributes of the model that disagree with the runs, as in the patch.
 
     Returns:
-        With the standard deviation of each new value, in its unit; none without a model.
+        With the standard deviation of each new value, in its unit; empty without a model.
     """
     after = judged.coefficients_after
     found: list[tuple[WrittenAttribute, float]] = []

@@ -37,10 +37,10 @@ from tunnel_sim.effects.registry import effect_class
 RUNS_LISTED: Final = 12
 """Maximum number of runs in a sentence. Judgement."""
 RUNS_TO_LOOK_AT: Final = 4
-"""Maximum number of runs that a step names; of more it gives the number. Judgement."""
+"""Maximum number of runs that a step names; for more runs it gives the number. Judgement."""
 ONE_WIND: Final = 0.02
-"""Ratio of the powers with and without wind below which nearly all of the gap belongs to one of them.
-Judgement."""
+"""Maximum ratio of the powers with and without wind (the smaller over the larger) at which nearly all of the
+gap belongs to the larger. Judgement."""
 
 _WIND = "whether it needs wind cannot be determined"
 
@@ -75,7 +75,7 @@ REASONS: Mapping[str, str | Callable[[Mapping[str, Any]], str]] = {
     "stated value is wrong, a stiffness is missing, or the runs differ by chance",
     "damping between runs": "each run alone is linear, but the runs' damping does not agree with one model",
 }
-"""Reasons why a gap acts on a channel, or needs wind: clauses by kind."""
+"""Clauses by kind: reasons for a channel of the gap, or for its dependence on wind."""
 
 
 def reason(given: Fact) -> str:
@@ -85,7 +85,7 @@ def reason(given: Fact) -> str:
 
 
 def where_words(where: Where, place: PlaceFound | Nowhere | None, judged: Judged) -> str:
-    """The place of the gap, in sentences; empty where there is none."""
+    """The place of the gap, in sentences; empty if there is none."""
     if place is None:
         return ""
     if isinstance(place, Nowhere):
@@ -102,7 +102,7 @@ def where_words(where: Where, place: PlaceFound | Nowhere | None, judged: Judged
     words = CHANNELS.get(where.channel or "")
     acts = f"It acts on {words}" if words else "The residuals alone do not show what it acts on"
     if words and place.compared and (place.alike or not (place.agrees or place.elsewhere)):
-        acts = f"It looks like a change of {words}"  # which the causes bring about as well
+        acts = f"It looks like a change of {words}"  # the causes produce the same pattern
     between = place.channel.kind in BETWEEN_RUNS and bool(scattering(judged.causes))
     if between:
         acts, channel = "Most of it is between the runs", "each run alone is linear"
@@ -110,7 +110,7 @@ def where_words(where: Where, place: PlaceFound | Nowhere | None, judged: Judged
         parts.append(f"{acts}: {channel}; {condition}.")
     else:
         parts.append(f"{acts}: {channel}.")
-        if place.wind:  # without runs of both winds the condition goes unsaid
+        if place.wind:  # runs with wind and without it are needed to state the condition
             conditions = {effect_class(name).condition for name in place.compared}
             if conditions and where.condition not in conditions:  # the causes act in other runs, too
                 parts.append(f"{condition[:1].upper()}{condition[1:]}.")
@@ -157,10 +157,10 @@ def _which_runs(where: Where, place: PlaceFound) -> str:
 
 
 def _places(where: Where, place: PlaceFound, unit: str) -> list[str]:
-    """The intervals that locate the gap.
+    """The intervals that contain the gap.
 
     Args:
-        unit: of the readings.
+        unit: unit of the readings.
     """
     places = []
     if "time_s" in place.narrow and where.time_s is not None:
@@ -182,7 +182,7 @@ def runs_of_the_gap(where: Where, place: PlaceFound | None) -> str:
 
 
 def _agreement(where: Where, place: PlaceFound) -> str:
-    """Whether causes act at the place that the residuals show; empty where there is nothing to compare."""
+    """Whether causes act at the place that the residuals show; empty if there is nothing to compare."""
     if not place.compared or where.channel is None:
         return ""
     kinds = [effect_class(name) for name in place.compared]
@@ -205,7 +205,7 @@ def _agreement(where: Where, place: PlaceFound) -> str:
         names = plain(*(kind.name for kind in alike))
         return f"{names[0].upper()}{names[1:]} look{'s' * (len(alike) == 1)} like this in a decay."
     if not place.elsewhere:
-        return ""  # the place does not speak against them
+        return ""  # the place does not contradict the causes
     return f"That does not agree with {plain(*place.compared)}: {' and '.join(acting)}."
 
 
@@ -234,7 +234,7 @@ def lines_table(maps: Maps | None, unit: str) -> TextTable:
     """Narrow lines in the residuals.
 
     Args:
-        unit: of the readings.
+        unit: unit of the readings.
     """
     rows = tuple(
         (
@@ -250,7 +250,7 @@ def lines_table(maps: Maps | None, unit: str) -> TextTable:
 
 
 def place_pictures(maps: Maps | None, judged: Judged) -> tuple[Picture, ...]:
-    """The map of the gap; none without data or a gap."""
+    """The figure of the map of the gap; none without data or a gap."""
     if maps is None or not judged.causes:
         return ()
     axis = "time" if maps.grid.wind_speeds is None else "the wind speed"
@@ -265,7 +265,7 @@ def place_pictures(maps: Maps | None, judged: Judged) -> tuple[Picture, ...]:
 
 
 def where_pictures(where: Where, maps: Maps | None) -> tuple[Picture, ...]:
-    """The place of the gap in the data of the figures; none without data."""
+    """The figures of the place of the gap; none without data."""
     if maps is None:
         return ()
     return (
@@ -281,7 +281,7 @@ def where_pictures(where: Where, maps: Maps | None) -> tuple[Picture, ...]:
             "where-profiles",
             "Excess of all runs together over time and over amplitude, in the frequency bands that show the "
             "gap. Grey: the level of noise alone, within three standard deviations. Yellow: the shortest "
-            "interval with four fifths of the gap. Missing moment: the share of its energy by time. It "
+            "interval with 80 % of the gap. Missing moment: the share of its energy by time. It "
             "shows when a moment acts, and so locates a blow.",
             "Excess against time and against amplitude, and the missing moment against time.",
             partial(profiles_figure, where, maps),
@@ -289,7 +289,7 @@ def where_pictures(where: Where, maps: Maps | None) -> tuple[Picture, ...]:
         Picture(
             "where-spectrum",
             "Residual power over noise power, by frequency. Grey: the level of noise alone, within three "
-            "standard deviations. In print, yellow: the shortest interval with four fifths of the gap; dark "
+            "standard deviations. In print, yellow: the shortest interval with 80 % of the gap; dark "
             "bar on the axis: the natural frequencies of the runs.",
             "Residual power against frequency, with the nominal model and with the causes added.",
             partial(spectrum_figure, where, maps.frequency),

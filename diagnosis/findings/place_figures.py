@@ -42,16 +42,16 @@ if TYPE_CHECKING:
 
 
 TIME = "time since the start of the record [s]"
-LEAST_POWER = 0.3  # of the noise: smaller values are drawn at the edge of the axis
+LEAST_POWER = 0.3  # excess in noise variances: smaller values are drawn at the edge of the axis
 ANGLE, RATE = "angle β [{}]", "rate β̇/ω [{}]"
 _MOST_CURVES = len(COLOURS)
-_LONG = 30  # characters of a label
+_LONG = 30  # characters in a label
 _LEGEND, _HANDLE = 62, 8  # characters: the width of the figure, and the line beside a label
 
 
 @styled
 def place_figure(cells: ExcessMap, misfit: Misfit) -> Figure:
-    """Misfit by amplitude and by wind speed, or by time where there is one speed.
+    """Misfit by amplitude and by wind speed, or by amplitude and time if the runs have one speed.
 
     Cells within the noise are empty. The figure is small enough for a phone.
     """
@@ -108,7 +108,7 @@ def run_cells(maps: Maps) -> tuple[Array, float, float]:
 def profiles_figure(where: Where, maps: Maps) -> Figure:
     """Excess over time and amplitude, all runs together, and the times at which a moment is missing.
 
-    The shaded intervals contain four fifths of the gap.
+    The shaded intervals contain 80 % of the gap.
     """
     mark, per_si = motion_shown(maps.unit)
     swings = None if where.amplitude_rad is None else [per_si * end for end in where.amplitude_rad]
@@ -127,7 +127,8 @@ def profiles_figure(where: Where, maps: Maps) -> Figure:
         axes.set_ylim(min(-4.0 * float(np.nanmedian(std)), 1.05 * float(np.nanmin(mean))), None)
         grid(axes)
     by_time.tick_params(labelbottom=False)
-    # The missing moment's energy shows when a moment acts, not the duration of the motion after it.
+    # The energy of the missing moment shows when a moment acts; the misfit lasts as long as the motion after
+    # it.
     edges, share = maps.time.edges_s, 100.0 * maps.time.moment_share
     moment.stairs(share, edges, fill=True, color=AFTER, alpha=0.6)
     moment.set(xlim=(0.0, edges[-1]), ylim=(0.0, 1.05 * max(float(share.max()), 20.0)))
@@ -141,7 +142,7 @@ def profiles_figure(where: Where, maps: Maps) -> Figure:
 def spectrum_figure(where: Where, given: ExcessSpectrum) -> Figure:
     """Residual power over frequency, all runs together, before and after, on logarithmic axes.
 
-    The shaded interval contains four fifths of the gap.
+    The shaded interval contains 80 % of the gap.
     """
     interval = where.frequency_hz
     fig = figure(NARROW, 3.0)
@@ -168,7 +169,7 @@ def spectrum_figure(where: Where, given: ExcessSpectrum) -> Figure:
 
 
 def spectrum_axis(given: ExcessSpectrum) -> tuple[Array, Array]:
-    """Edges of the bins for a logarithmic scale, the first half the second instead of zero; and centres, Hz."""
+    """Edges of the bins for a logarithmic scale, the first at half the second, not at zero; and centres, Hz."""
     edges = given.edges_hz
     positive = np.concatenate([[0.5 * edges[1]], edges[1:]])
     return positive, np.sqrt(positive[:-1] * positive[1:])

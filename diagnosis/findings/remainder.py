@@ -51,16 +51,17 @@ MATERIAL_SHARE: Final = 0.01
 quoted to one per cent."""
 
 NOISE_STDS: Final = 2.0
-"""Margin of the upper bound on the explainable share, where the residual is noise, in standard deviations.
+"""Margin of the upper bound on the explainable share where the residual is noise, in standard deviations.
 Convention."""
 
 
 @dataclass(frozen=True)
 class Move:
-    """Move of a coefficient by the remainder.
+    """Move of a coefficient due to the remaining gap.
 
     Args:
-        value: half the difference between the halves of the data that differ most, beyond chance, in ``unit``.
+        value: half the excess over chance of the difference between the two most different halves of the data,
+            in ``unit``.
         relative: ``value`` over the coefficient's absolute value, a fraction; None where the coefficient is zero.
         std: standard deviation stated for the coefficient, in ``unit``; None where the runs do not determine it.
         material: whether the remainder is significant and moves the coefficient by more than its standard
@@ -79,12 +80,13 @@ class Remainder:
     """The gap that remains after the named causes; the whole gap where none is named.
 
     Args:
-        significant: whether it is beyond chance, by the tests of the gap.
-        excess: on held-out readings, in noise variances of a sample.
-        p_value: of the strongest test, corrected for the number of tests.
-        material: whether it is significant and moves a coefficient by more than its standard deviation or by 1 %.
+        significant: whether the remaining gap is beyond chance, by the tests of the gap.
+        excess: mean squared scaled residual minus one on held-out readings, in noise variances of a sample.
+        p_value: p-value of the strongest test, corrected for the number of tests.
+        material: whether the gap is significant and moves a coefficient by more than its standard deviation or
+            by 1 %.
         words: the remainder in sentences; empty until they are written.
-        further: a significant effect beside the causes that is too small to be named; empty where there is none.
+        further: a significant effect beside the causes that is too small to be named; empty if there is none.
     """
 
     significant: bool
@@ -101,13 +103,13 @@ class Remainder:
         after, named = judged.coefficients_after, judged.names_effects
         moves, excess, misfit = rest.moves, rest.excess, judged.misfit
         size = f"{misfit.rms_words(excess)} root mean square"
-        larger = (
-            excess > 1.0
-        )  # than the noise: people see it in the fit, whatever it does to the coefficients
+        larger = excess > 1.0  # visible in the fit, whatever the move of the coefficients
         if larger:
             size = f"{size}, {significant(math.sqrt(excess), 2)} times the noise"
-        left = f"the residual ({size})" if named else "the gap"
-        subject = f"Part of the gap remains: {left}" if named and larger else left[0].upper() + left[1:]
+        remaining = f"the residual ({size})" if named else "the gap"
+        subject = remaining[0].upper() + remaining[1:]
+        if named and larger:
+            subject = f"Part of the gap remains: {remaining}"
         material = [name for name, move in moves.items() if move.material]
         known = [name for name, move in moves.items() if move.std is not None]
         if not causes:
@@ -116,7 +118,7 @@ class Remainder:
             words = "The residual is within the noise."
         elif material:
             moved = _each({name: change_up_to(moves[name].value, after[name]) for name in material})
-            start = f"Part of the gap remains: {left}" if named else subject
+            start = f"Part of the gap remains: {remaining}" if named else subject
             words = f"{start} could change {moved}. Do not trust the coefficients beyond the intervals given."
         elif not known:
             words = f"{subject} changes no coefficient that these runs determine."
@@ -136,25 +138,27 @@ class Remainder:
 def remainder(
     study: Study, stated: Estimates, moved: Mapping[str, float], excess: float, hidden: Sequence[Hidden] = ()
 ) -> Remainder:
-    """Judge the residual gap of the answer; a remainder within chance is never material.
+    """Judge the residual gap of the answer; a gap within chance is never material.
 
-    The tests by band are blind to whatever coloured noise absorbs. A significant further effect shows it.
+    Coloured noise absorbs a part of the residual that the tests by band cannot see. A significant further
+    effect shows it.
 
     Args:
         stated: the coefficients of the answer's fit with their standard deviations.
-        moved: by the same names, their moves by the remainder (`coefficient_move`), in their units.
+        moved: moves of the coefficients by the remainder, by the same names (`coefficient_move`), in their
+            units.
         excess: on held-out readings, in noise variances of a sample.
         hidden: the effects that could hide beside the answer; effects without a limit do not count.
     """
     moment, chosen = study.moment, study.settings.answer
-    if moment is not None:  # its runs have innovations
+    if moment is not None:  # the runs have innovations
         runs = zip(study.chosen.problem.data.runs, study.chosen.residuals, strict=True)
         still = [residual for run, residual in runs if run.id not in moment.process.runs]
         both = np.concatenate([*moment.process.innovations, *still])
         p_value = float(chdtrc(both.size, both @ both))
     elif study.chosen is study.nominal:
         p_value = study.gap.test.p_value
-    else:  # no cause changes the tests of the noise itself: the tests of the residuals count
+    else:  # no cause changes the tests of the noise itself, so the tests of the residuals count
         noise = study.prepared.noise.rounded(study.chosen, study.prepared.step)
         p_value = gap_test(study.chosen, noise, study.prepared.trend, coarse_step=True).p_value
     hidden = [one for one in hidden if one.size.determined]
@@ -166,7 +170,7 @@ def remainder(
     moves = {}
     for name, given in stated.items():
         relative = moved[name] / abs(given.value) if given.value else None
-        # by its standard deviation, or by a share, where the runs determine it
+        # by the standard deviation, or by 1 %, where the runs determine the coefficient
         far = given.std is not None and (moved[name] > given.std or (relative or 0.0) > MATERIAL_SHARE)
         moves[name] = Move(moved[name], relative, given.std, given.unit, material=beyond_chance and far)
     return Remainder(
@@ -180,45 +184,47 @@ def remainder(
 
 
 def _each(sizes: dict[str, str]) -> str:
-    """Coefficients with the sizes of their changes."""
+    """Text: each coefficient with the size of its change."""
     return listed([f"{COEFFICIENTS.get(name, name)} by {size}" for name, size in sizes.items()])
 
 
-def closable_words(found: Closable | None, judged: Judged) -> str:
-    """The part of the remainder that could be explained, in a few sentences; empty where it is not known."""
-    if found is None:
+def closable_words(closable: Closable | None, judged: Judged) -> str:
+    """A few sentences on the explainable part of the remainder; empty where it is not known."""
+    if closable is None:
         return ""
     named = judged.causes != UNKNOWN and judged.decided
     beyond = " beyond the scatter between runs" if scattering(judged.causes) else ""
-    left = "the residual gap" if named else f"the gap{beyond}"
-    ceilings = found.ceilings
-    if found.kind == "noise":
-        most = max((one for one in ceilings if one.determined()), key=lambda one: one.closed)
+    gap_words = "the residual gap" if named else f"the gap{beyond}"
+    ceilings = closable.ceilings
+    if closable.kind == "noise":
+        most = max(
+            (ceiling for ceiling in ceilings if ceiling.determined()), key=lambda ceiling: ceiling.closed
+        )
         bound = percent(max(most.closed, 0.0) + NOISE_STDS * most.std)
         return (
-            f"No smooth moment or error of the reading could explain more than {bound} of {left}: the rest is "
+            f"No smooth moment or error of the reading could explain more than {bound} of {gap_words}: the rest is "
             "noise."
         )
-    of_others = _measured_otherwise(found.kind, ceilings)
-    return " ".join([*_largest(found, ceilings, left), *of_others, *_line(found.line)])
+    of_others = _measured_otherwise(closable.kind, ceilings)
+    return " ".join([*_largest(closable, ceilings, gap_words), *of_others, *_line(closable.line)])
 
 
-def _largest(found: Closable, ceilings: Sequence[Ceiling], left: str) -> list[str]:
-    """The share of the kind beside the other kinds' shares, its place, and its formula."""
-    kind, where, law = found.kind, found.events, found.law
-    best = next(one for one in ceilings if one.kind == kind)
+def _largest(closable: Closable, ceilings: Sequence[Ceiling], gap_words: str) -> list[str]:
+    """The share that this kind explains beyond the other kinds, its place, and its formula."""
+    kind, where, law = closable.kind, closable.events, closable.law
+    best = next(ceiling for ceiling in ceilings if ceiling.kind == kind)
     sentences = [
-        f"{KINDS[kind].capitalize()} could explain {percent(best.closed, best.std)} of {left} (measured on "
+        f"{KINDS[kind].capitalize()} could explain {percent(best.closed, best.std)} of {gap_words} (measured on "
         f"held-out {best.held_out})."
     ]
-    if found.alike:
+    if closable.alike:
         sentences.append(
-            f"These runs cannot distinguish it from {' or '.join(KINDS[one] for one in found.alike)}."
+            f"These runs cannot distinguish it from {' or '.join(KINDS[other] for other in closable.alike)}."
         )
-    elif found.next_most is not None:
-        alike = all(one.held_out == best.held_out for one in ceilings)
+    elif closable.next_most is not None:
+        alike = all(ceiling.held_out == best.held_out for ceiling in ceilings)
         other = f"No other kind{'' if alike else f' measured on {best.held_out}'}"
-        sentences.append(f"{other} would explain more than {percent(max(found.next_most, 0.0))}.")
+        sentences.append(f"{other} would explain more than {percent(max(closable.next_most, 0.0))}.")
     if where and kind != "line":
         run = f"run {where[0]['run']} ({where[0]['from_s']:.2f} to {where[0]['to_s']:.2f} s)"
         largest = "" if len(where) == 1 else f"{len(where)} runs, the largest part in "
@@ -232,22 +238,24 @@ def _largest(found: Closable, ceilings: Sequence[Ceiling], left: str) -> list[st
 
 def _with_values(law: Law) -> str:
     """The numbers of a formula, as a clause; empty where it has none."""
-    stated, said, unknown = law.effect.get("parameters", {}), [], []
+    stated, determined, unknown = law.effect.get("parameters", {}), [], []
     for name, (value, std) in law.parameters.items():
         if not 0.0 < std < _UNKNOWN * abs(value):
             unknown.append(name)
             continue
         unit = stated.get(name, {}).get("unit", "1")
-        said.append(f"{name} = {with_std(value, std)}{unit_mark(beside(unit))}")
-    left = f"{listed(unknown)} not determined by these runs" if unknown else ""
-    return f", with {listed([*said, *filter(None, [left])])}" if said or left else ""
+        determined.append(f"{name} = {with_std(value, std)}{unit_mark(beside(unit))}")
+    undetermined = f"{listed(unknown)} not determined by these runs" if unknown else ""
+    return (
+        f", with {listed([*determined, *filter(None, [undetermined])])}" if determined or undetermined else ""
+    )
 
 
 _UNKNOWN = 10.0  # standard deviations over the value: neither sign nor order of magnitude is known
 
 
 def formula_line(found: Closable | None, judged: Judged) -> str:
-    """How to try the formula of the remainder, or an effect that one suspects; empty where there is neither."""
+    """How to test the formula of the remainder, or a suspected effect; empty if there is neither."""
     if found is None or found.law is None:
         suspect = "State the suspected effect in a file, and diagnose again with --effects-file."
         return suspect if judged.causes == UNKNOWN and not judged.cycling else ""
@@ -258,7 +266,7 @@ def formula_line(found: Closable | None, judged: Judged) -> str:
 
 
 def _measured_otherwise(kind: str, ceilings: Sequence[Ceiling]) -> list[str]:
-    """The kind that explains more than the named one, on other held-out readings, and why it is not named.
+    """The kind that explains more than the named one on other held-out readings, and why it is not named.
 
     Empty where no kind does.
     """
@@ -274,18 +282,18 @@ def _measured_otherwise(kind: str, ceilings: Sequence[Ceiling]) -> list[str]:
     ]
 
 
-def _line(found: Line | None) -> list[str]:
+def _line(line: Line | None) -> list[str]:
     """A steady line, in a sentence; none without one."""
-    if found is None:
+    if line is None:
         return []
-    frequency = with_std(found.frequency_hz, found.frequency_std_hz)
-    mark, factor = unit_shown(found.unit)
-    amplitude = with_std(factor * found.amplitude, factor * found.amplitude_std)
+    frequency = with_std(line.frequency_hz, line.frequency_std_hz)
+    mark, factor = unit_shown(line.unit)
+    amplitude = with_std(factor * line.amplitude, factor * line.amplitude_std)
     amplitude += joined_mark(mark)
     return [
         f"The line is at {frequency} Hz. Its amplitude is {amplitude} (root mean square over the runs). Chance "
         "alone shows a line in less than "
-        f"{100.0 * found.false_alarm_rate:.2g} % of campaigns."
+        f"{100.0 * line.false_alarm_rate:.2g} % of campaigns."
     ]
 
 
@@ -293,7 +301,7 @@ _LABEL = "What could explain the residual gap"
 
 
 def closable_line(found: Closable | None, rest: Remainder | None, judged: Judged) -> str:
-    """The part that could be explained, in a line; empty where there is no gap, or it is not known."""
+    """The explainable part, in a line; empty without a gap, or where it is not known."""
     if found:
         return f"{_LABEL}: {found.words}"
     if rest is None or not judged.causes:
@@ -306,9 +314,9 @@ def closable_line(found: Closable | None, rest: Remainder | None, judged: Judged
 
 
 def closable_table(found: Closable | None) -> TextTable:
-    """Share that each kind could explain, in per cent, the named kind first.
+    """Share of the remainder that each kind could explain, in per cent, the named kind first.
 
-    A table without rows where nothing remains beyond chance.
+    A table without rows where the remainder is within chance.
     """
     kind = "" if found is None else found.kind
     ceilings = sorted(found.ceilings if found else (), key=lambda one: one.kind != kind)
@@ -324,20 +332,20 @@ def closable_table(found: Closable | None) -> TextTable:
     return TextTable(title, ("kind of law", "share", "held out"), tuple(rows), ("share",))
 
 
-def law_pictures(found: Closable | None, reading: str) -> tuple[Picture, ...]:
-    """The law without a formula; none without one.
+def law_pictures(closable: Closable | None, reading: str) -> tuple[Picture, ...]:
+    """The figure of a law without a formula; none with a formula.
 
     Args:
         reading: unit of the readings.
     """
-    if found is None or found.curve is None:
+    if closable is None or closable.curve is None:
         return ()
     caption = (
         "The missing law, estimated without a formula, with its 95 % band. White cells of a map are within the "
         "band. The part that the coefficients and the zero of the model absorb is subtracted."
     )
     description = "The missing moment, or error of the reading, as a curve with its band or as a map."
-    return (Picture("law", caption, description, partial(law_figure, found.curve, reading)),)
+    return (Picture("law", caption, description, partial(law_figure, closable.curve, reading)),)
 
 
 @styled
@@ -350,7 +358,7 @@ def law_figure(curve: Curve, reading: str) -> Figure:
     units = freedom_of_unit(reading).shown
     motion, rate = [*units.values()][:2]
     shape = [len(axis) for axis in curve.places]
-    unit, factor = units.get(curve.unit, (curve.unit, 1.0))  # a moment is shown as it is
+    unit, factor = units.get(curve.unit, (curve.unit, 1.0))  # moments keep their unit
     values, std = (factor * np.reshape(given, shape) for given in (curve.values, curve.std))
     name = f"{'error of the reading' if curve.unit == next(iter(units)) else 'missing moment'} [{unit}]"
     axes_by_name = {

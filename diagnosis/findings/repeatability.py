@@ -27,11 +27,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WIDTH_KNOWN_WITHIN: Final = 10.0
-"""Ratio of the ends of the interval of a width above which the width is poorly known. Convention. An order of
+"""Maximum ratio of the ends of a width's interval for the width to count as well known. Convention. An order of
 magnitude."""
 DEVIATION_NAMED: Final = 3.0
-"""Minimum deviation of the frequency or damping of an outlying run to be stated, in the scatter of the
-others, in standard deviations. Convention."""
+"""Minimum deviation in frequency or damping for an outlying run to be stated, in standard deviations of the
+other runs. Convention."""
 
 _MEANT = (
     "These are standard deviations between runs, with 90 % intervals; the intervals of the coefficients allow for "
@@ -52,11 +52,12 @@ _DRIFTS = {
 
 @dataclass(frozen=True)
 class AnswerWithout:
-    """The answer from the other runs, without a run that deviates far beyond them.
+    """The answer from the other runs, without an outlying run.
 
     Args:
-        causes: names, sorted; empty: no gap, or none is needed; ``unknown`` alone: no effect explains the gap.
-        probability: of that answer (a probability); 1 where there is no gap.
+        causes: effect names, sorted; empty: no gap, or no cause is needed; ``unknown`` alone: no effect
+            explains the gap.
+        probability: probability of this answer; 1 without a gap.
     """
 
     causes: tuple[str, ...]
@@ -70,10 +71,11 @@ class RunRepeatability:
     Args:
         spreads: chance differences between the runs; empty where they repeat.
         runs: every run against the model.
-        outlier: id of the run that deviates far beyond the others; empty: none.
-        trends: numbers that differ by a pattern, beyond chance; of each the clearest pattern.
-        without_outlier: the answer without that run; None: there is none, or the others cannot be diagnosed.
-        limits: of scatter where none was detected or stated; else None.
+        outlier: id of the outlying run; empty: none.
+        trends: quantities that vary by a pattern, beyond chance; for each quantity the clearest pattern.
+        without_outlier: the answer without the outlying run; None: no such run, or the others cannot be
+            diagnosed.
+        limits: upper limits of scatter if none was detected or stated; else None.
     """
 
     spreads: tuple[Spread, ...] = ()
@@ -91,7 +93,8 @@ class RunRepeatability:
             fitted: the fit of the answer.
 
         Returns:
-            None for a single run, for a body without a spring, and where the model's sensitivities are not finite.
+            None for a single run, for a body without a spring, and where the model's sensitivities are not
+            finite.
         """
         found = RunDeviations.of(fitted)
         if found is None:
@@ -108,11 +111,11 @@ class RunRepeatability:
         return any(one.width for one in self.spreads)
 
     def repeats(self, judged: Judged) -> bool:
-        """Whether a test that could see scatter between the runs saw none, and none is stated."""
+        """Whether a test that can detect scatter between the runs detected none, and none is stated."""
         return not self.scatters and not self._undetermined(judged)
 
     def _undetermined(self, judged: Judged) -> str:
-        """The reason why it is not known whether the runs repeat, as a clause; empty where it is known.
+        """The reason why the runs' repeatability is unknown, as a clause; empty where it is known.
 
         Scatter is measured against the noise, so the answer must explain the runs down to their noise.
         """
@@ -133,7 +136,7 @@ class RunRepeatability:
         """The parameter of a scatter in per cent, with its interval in the answer; None for other effects.
 
         Args:
-            effect: that the parameter belongs to.
+            effect: the effect to which the parameter belongs.
             given: the parameter.
         """
         if effect not in SCATTERS:
@@ -146,7 +149,7 @@ class RunRepeatability:
         return " ".join(filter(None, (self.scatter_words(judged), self._outlier_words(judged))))
 
     def scatter_words(self, judged: Judged) -> str:
-        """Chance differences or drifts of the runs and their meaning; empty where there are none."""
+        """Chance differences or drifts of the runs and their meaning; empty if there are none."""
         shown = [one for one in self.spreads if one.shown]
         if not shown:
             return self._stated_words(judged)
@@ -162,7 +165,7 @@ class RunRepeatability:
         return " ".join([*said, *_told_apart(self.spreads)])
 
     def systematic(self, judged: Judged) -> list[str]:
-        """Words for what the examination found of a pattern in the runs' differences; and the patterns' effects."""
+        """Sentences on a pattern of the runs' differences in the examination, and the effects that cause it."""
         remarks = [remark.figures.get(SYSTEMATIC) for remark in judged.remarks]
         return [*filter(None, remarks), *(one.effect for one in self.trends)]
 
@@ -178,7 +181,7 @@ class RunRepeatability:
         return f"The runs differ from each other by chance{only} (probability {likely})"
 
     def _stated_words(self, judged: Judged) -> str:
-        """The statement that the runs differ no more than the campaign states; empty where it states nothing."""
+        """The statement that the scatter is within the stated one; empty where the campaign states none."""
         stated = [one for one in self.spreads if one.stated]
         if not stated or judged.causes == UNKNOWN:
             return ""
@@ -186,7 +189,7 @@ class RunRepeatability:
         return f"The runs differ no more than stated ({sizes}); the intervals allow for it."
 
     def _outlier_words(self, judged: Judged) -> str:
-        """The run that deviates far beyond the others, with its deviation; empty without one."""
+        """The outlying run with its deviation; empty without one."""
         run = self.outlier
         if not run:
             return ""
@@ -214,7 +217,7 @@ class RunRepeatability:
         return f"Without it the answer is {plain(*causes)} ({known})."
 
     def steps(self, judged: Judged) -> list[NextStep]:
-        """Next steps for a run that deviates far beyond the others, and for poorly distinguished quantities."""
+        """Next steps for an outlying run, and for poorly distinguished quantities."""
         run = self.outlier
         steps = (
             [
@@ -228,7 +231,7 @@ class RunRepeatability:
         )
         poorly = _told_apart(self.spreads)
         named = {SCATTERS[name] for name in scattering(judged.causes)}
-        if poorly and "wind_speed" not in named:  # its advice includes this
+        if poorly and "wind_speed" not in named:  # the advice for the scatter includes this step
             steps.append(NextStep("Log the wind speed of every run", "tells its scatter from the spring's"))
         return steps
 
@@ -285,19 +288,19 @@ class RunRepeatability:
 
 
 def _stated(spread: Spread) -> str:
-    """The scatter stated by the campaign, in its own form; nothing stated is none."""
+    """The scatter stated by the campaign, in its own form, or the statement that none is stated."""
     return f"{100.0 * (spread.stated or 0.0):.4g} %"
 
 
 def width_text(spread: Spread) -> str:
-    """A width with its interval, such as ``0.29 % (0.13 to 0.62 %)``; without it for a stated width."""
+    """A width with its interval, such as ``0.29 % (0.13 to 0.62 %)``; a stated width has none."""
     low, high = spread.interval
     text = percent_of(spread.width)
     return text if low == high else f"{text} ({percent_of(low).removesuffix(' %')} to {percent_of(high)})"
 
 
 def _differs(spread: Spread, trends: Mapping[str, Trend]) -> str:
-    """One quantity that differs: its width, the reference, and the runs that deviate most."""
+    """One quantity that differs: its width, the reference, and the runs with the largest deviations."""
     text = f"{NUMBERS[SCATTERS[spread.effect]]} by {width_text(spread)}"
     if spread.stated is not None:
         text += f", beyond the {_stated(spread)} stated"
@@ -345,13 +348,13 @@ def _limits(limits: ScatterLimits) -> str:
 
 
 def _root_mean_square(runs: Sequence[RunRepeat], name: str, *, of_scatter: bool = False) -> str:
-    """Root mean square over the runs of their own deviations of a quantity, or of its scatter, in per cent."""
+    """Root mean square over the runs of their deviations in a quantity, or of its scatter, in per cent."""
     place = 2 if of_scatter else 0
     return percent_of((sum(one.deviation(name)[place] ** 2 for one in runs) / len(runs)) ** 0.5)
 
 
 def _band(width: Share) -> str:
-    """The scatter of a quantity by chance, such as `` (± 0.039)``."""
+    """The chance scatter of a quantity, such as `` (± 0.039)``."""
     return f" (± {percent_of(width).removesuffix(' %')})"
 
 
@@ -362,7 +365,7 @@ def _signed(value: float, std: float) -> str:
 
 
 def _told_apart(spreads: Sequence[Spread]) -> list[str]:
-    """The statement that the runs hardly distinguish two quantities, where so."""
+    """The statement that the runs hardly distinguish two quantities; empty where they do."""
     both = [one for one in spreads if SCATTERS[one.effect] in ("wind_speed", "spring_stiffness")]
     if len(both) < 2 or not any(one.shown for one in both):
         return []
@@ -384,8 +387,8 @@ def _told_apart(spreads: Sequence[Spread]) -> list[str]:
 
 _ROW = 0.24  # inches for a run
 _AROUND = 1.25  # inches: key, axis and its label
-_BAND_HEIGHT = 0.72  # of a row
-_MARGIN = 0.08  # of the axis
+_BAND_HEIGHT = 0.72  # share of a row
+_MARGIN = 0.08  # share of the axis
 _BESIDE = 7.0  # points between a mark and its text
 _DRAWN_NUMBERS = {"frequency": "frequency", "damping": "damping ratio"}
 
@@ -447,7 +450,7 @@ def _draw_runs(axes: Axes, runs: Sequence[RunRepeat], name: str, outlier: str) -
     axes.locator_params(axis="x", nbins=4)
     grid(axes, "x")
     for row in np.flatnonzero(far & (np.abs(value) > reach)).tolist():
-        # on the side that has room
+        # on the side with more room
         side = -1.0 if value[row] > float(np.mean(axes.get_xlim())) else 1.0
         axes.annotate(
             percent_of(runs[row].deviation(name)[0], sign=True), (value[row], row), (side * _BESIDE, 0),

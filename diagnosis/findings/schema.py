@@ -28,7 +28,8 @@ def diagnosis_schema() -> Schema:
     found["$defs"]["Maps"]["properties"]["friction"] = fields.pop("friction")
     fields |= {"schema_version": {"const": SCHEMA_VERSION}}
     fields |= _decision(found["$defs"].pop("Decision")) | _waterfall(found["$defs"].pop("Waterfall"))
-    found["required"] = sorted(fields.keys() - {"motion", "motion_scale"})  # of a displacement only
+    # only a displacement has this field
+    found["required"] = sorted(fields.keys() - {"motion", "motion_scale"})
     return found
 
 
@@ -72,7 +73,7 @@ def _renamed(names: Mapping[str, str]) -> Callable[[Schema], None]:
 
 
 def _fact(part: Schema) -> None:
-    """A fact has its figures beside its kind."""
+    """A fact has its figures and its kind side by side."""
     del part["properties"]["figures"]
 
 

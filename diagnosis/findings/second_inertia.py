@@ -1,4 +1,4 @@
-"""The sentence on a second inertia of a joint, behind a spring, and on what shows it."""
+"""The sentence on a second inertia of a joint behind a spring, and on its evidence."""
 
 from __future__ import annotations
 

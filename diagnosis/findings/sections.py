@@ -1,4 +1,4 @@
-"""A diagnosis in sections of blocks, from its findings: the content of every face.
+"""A diagnosis in sections of blocks, from its findings: the content of every presentation.
 
 A terminal, ``print``, a notebook and the bench show the sections without their details (`printed`); the report
 shows all of them.
@@ -63,10 +63,10 @@ EFFECT_LISTED: Final = 0.01
 
 
 def sections(answer: Findings, campaign: Campaign | None = None) -> tuple[Section, ...]:
-    """The whole answer.
+    """The sections of the whole answer.
 
     Args:
-        campaign: adds the conditions of the runs.
+        campaign: the campaign, if the sections are to state the conditions of its runs.
     """
     blown = bool(campaign.in_wind) if campaign else answer.windy
     found = _sections(answer, campaign, blown=blown)
@@ -113,7 +113,7 @@ def _sections(answer: Findings, campaign: Campaign | None, *, blown: bool) -> tu
 
 
 def printed(answer: Findings) -> tuple[Block, ...]:
-    """The blocks of a face without room for details, in order."""
+    """The blocks of a presentation without room for details, in order."""
     return tuple(block for section in sections(answer) for block in brief(section.blocks))
 
 

@@ -1,4 +1,4 @@
-"""Springs, one of them off, where the runs cannot tell which: with their errors, in words and steps."""
+"""Springs of which one is off where the runs cannot tell which: their errors, in words and steps."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from identification.show.numbers import for_people, listed, plain, probability
 
 
 def spring_choices(study: Study) -> tuple[SpringError, ...]:
-    """The springs, one of them off, where the runs cannot tell which."""
+    """The springs of which one is off, where the runs cannot tell which."""
     return tuple(
         replace(
             spring_error(one.hypothesis.fit, ONE_SPRING.name, study.similarity), probability=one.probability
@@ -28,7 +28,7 @@ def one_of_springs(found: Sequence[SpringError]) -> str:
 
 
 def count_of_springs(found: Sequence[SpringError]) -> str:
-    """The number of these springs, in words."""
+    """The number of possible springs, in words."""
     count = len(found)
     return "two" if count == 2 else str(count)
 

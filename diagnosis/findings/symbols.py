@@ -39,7 +39,7 @@ def symbol_rows(
     """Symbols of coefficients and causes, and the symbols that explain them, with meaning and unit.
 
     Args:
-        parameters: fitted ones of the causes, by full name.
+        parameters: full names of the fitted parameters of the causes.
     """
     kinds = [kind for kind in known_effects() if kind.name in causes]
     texts = [COEFFICIENTS.get(name, name) for name in coefficients] + [kind.equation for kind in kinds]
@@ -62,5 +62,5 @@ def symbol_rows(
 
 
 def _holds(text: str, symbol: str) -> bool:
-    """Whether a text has a symbol by itself: ``β`` is neither in ``Cnβ`` nor in ``β̇``."""
+    """Whether a text contains a symbol by itself: ``β`` is neither in ``Cnβ`` nor in ``β̇``."""
     return re.search(rf"(?<!\w){re.escape(symbol)}(?![\w\u0307\u0308])", text) is not None

@@ -20,7 +20,7 @@ CHANNELS = {
 
 
 CONDITIONS = {"always": "with the wind on and off", "wind_on": "only with the wind on"}
-"""The condition under which a cause acts, or a gap shows."""
+"""The condition under which a cause acts or a gap shows."""
 
 
 BANDS = {
@@ -100,7 +100,7 @@ def named_runs(names: Sequence[str]) -> str:
 
 
 def among_answers(effect: str) -> str:
-    """An answer by name, without scatter between runs, which is stated for all answers together."""
+    """An answer by name; its scatter between runs is omitted, because it is stated for all answers together."""
     names = effect.split(" + ")
     proper = without_scatter(names)
     if effect == "unknown":
@@ -117,6 +117,6 @@ def named_answer(causes: Sequence[str]) -> str:
 
 
 def answer_name(effect: str) -> str:
-    """Names of effects joined by plus signs, with every scatter between runs as one part."""
+    """Names of effects joined by plus signs; all kinds of scatter between runs are one name."""
     names = effect.split(" + ")
     return " + ".join([*without_scatter(names), *([BETWEEN_RUNS] if scattering(names) else [])])

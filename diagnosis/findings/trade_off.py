@@ -21,8 +21,8 @@ from tunnel_sim.vocabulary.dimensions import angle_power, dimension
 def least_separated(fit: Fit, campaign: Campaign) -> TradeOff | None:
     """The trade-off among the common parameters of a fit; None where the runs separate all of them.
 
-    A parameter at the end of its range counts only beside one with which it adds up: the runs determine their sum,
-    and the bound limits the split.
+    A parameter at the end of its range counts only beside one with which it adds up: the runs determine the
+    sum, and the bound limits how it is split.
     """
     names, of, covariance = fit.problem.names, roles(fit), fit.stated_covariance.copy()
     shapes = [of[name].amplitude is None for name in names]
@@ -93,10 +93,10 @@ def roles(fit: Fit) -> Mapping[str, Role]:
 
 
 def role_in_effect(kind: type[Effect], info: ParameterInfo) -> Role:
-    """The role of an effect's parameter, by its unit and by where its effect acts."""
+    """The role of an effect's parameter, by its unit and by the place where its effect acts."""
     kg, _, s = dimension(info.unit)
     windy, damps = kind.condition == "wind_on", kind.channel == "damping"
-    shapes = info != kind.parameters()[0]  # all but the severity
+    shapes = info != kind.parameters()[0]  # all parameters but the severity
     return Role(
         amplitude=None if shapes else 1.0 - angle_power(info.unit),
         frequency=s + 2.0 if kg == 1.0 else float(windy and damps),

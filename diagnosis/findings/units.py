@@ -38,11 +38,11 @@ def parameter_unit(name: str, campaign: Campaign, model: NominalModel) -> str:
         within = [dimension(unit) for unit, missing in factors.items() if missing]
         return in_si(functools.reduce(product, within, NUMBER))
     if info.unit == "l/V" and rig.reference_length is None:
-        return "m"  # a·l, which over V is the time
+        return "m"  # area times length, which over V is the time
     return model.identified_unit(info.unit)
 
 
-#: By whether area and length are unstated: name and unit of the product identified in place of a coefficient.
+#: By whether area and length are unstated: name and unit of the product that replaces a coefficient.
 _PRODUCTS = {
     (True, False): {"cn_beta": ("cn_beta_area", "m2/rad"), "cn_r": ("cn_r_area", "m2/rad")},
     (False, True): {"cn_beta": ("cn_beta_length", "m/rad"), "cn_r": ("cn_r_length2", "m2/rad")},
@@ -54,11 +54,12 @@ def sized_coefficients(found: Mapping[str, Quantity], rig: RigProperties) -> dic
     """Coefficients under the names of the identified quantities.
 
     Args:
-        found: ``cn_beta`` and ``cn_r``, with 1 in place of every unstated size; or other coefficients.
+        found: ``cn_beta`` and ``cn_r``, with 1 for every unstated size; or other coefficients.
 
     Returns:
-        The same where both sizes are stated; else Cnβ and Cnr times the missing ones, given in their names:
-        ``cn_beta_area_length`` is Cnβ·A·l (m³/rad) and ``cn_r_area_length2`` is Cnr·A·l² (m⁴/rad).
+        The same coefficients where both sizes are stated; else Cnβ and Cnr times the unstated sizes, as their
+        names
+        say: ``cn_beta_area_length`` is Cnβ·A·l (m³/rad) and ``cn_r_area_length2`` is Cnr·A·l² (m⁴/rad).
     """
     products = _PRODUCTS.get((rig.frontal_area is None, rig.reference_length is None), {})
     sized = {}
@@ -74,14 +75,14 @@ def own_estimates(values: Mapping[str, Quantity], similarity: Similarity) -> dic
 
 
 def own_fact(given: Fact, similarity: Similarity) -> Fact:
-    """A fact whose figures in ``_rad``, which are readings, are in the measured campaign's units."""
+    """A fact in the measured campaign's units: figures with names ending in ``_rad`` are readings."""
     factor = similarity.own(1.0, similarity.reading)
     own = {name: factor * value if name.endswith("_rad") else value for name, value in given.figures.items()}
     return replace(given, figures=own)
 
 
 def own_repeatability(given: RunRepeatability, similarity: Similarity) -> RunRepeatability:
-    """The runs' repeatability with frequencies of the measured rig; all else is relative."""
+    """The runs' repeatability with frequencies of the measured rig; all other figures are relative."""
     runs = (replace(one, frequency_hz=similarity.own(one.frequency_hz, "Hz")) for one in given.runs)
     return replace(given, runs=tuple(runs))
 
@@ -92,11 +93,11 @@ def own_parameters(
     """Parameters of effects in the measured campaign's units.
 
     Args:
-        given: by ``effect.parameter``, in the effects' own units, for the similar campaign.
+        given: by ``effect.parameter``, in the effects' units, for the similar campaign.
 
     Returns:
-        The same quantities, in the units of `parameter_unit`. The coefficient of a power of the rate that differs
-        from the textbook's scales with that power of time.
+        The same quantities, in the units of `parameter_unit`. The coefficient of a power of the rate other than
+        the textbook's scales with that power of time.
     """
     found = {}
     for name, value in given.items():
@@ -121,10 +122,11 @@ def own_hidden(
     similarity: Similarity,
     model: NominalModel,
 ) -> tuple[Hidden, ...]:
-    """The effects that could hide, in the measured campaign's units, by their influence on a coefficient.
+    """The effects that could hide, in the measured campaign's units, ordered by their influence on a coefficient.
 
     Args:
-        coefficients: estimates of the similar campaign, whose standard deviations are the reference of the moves.
+        coefficients: estimates of the similar campaign; their standard deviations are the reference of the
+            moves.
     """
 
     def greatest(one: Hidden) -> float:

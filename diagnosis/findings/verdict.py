@@ -117,7 +117,7 @@ def _answer(answer: Findings, rest: str) -> str:
     if not proper:
         return " ".join(filter(None, (there_is, repeats, "These differences explain", *last)))
     acting = []
-    for name in proper:  # the channel of each and, where the campaign can show it, the condition
+    for name in proper:  # the channel of each cause and, if the campaign can show it, the condition
         kind = effect_class(name)
         wind = f", {CONDITIONS[kind.condition]}" if facts.both_winds else ""
         subject = plain(name) if len(proper) > 1 else "the cause"

@@ -24,9 +24,9 @@ class AirMoment:
     """A moment of the air on the body, by the nominal model and by the model with the causes.
 
     Args:
-        motion: that it opposes or follows: ``1° of yaw``, or ``1 °/s of yaw rate``.
-        before: by the nominal model, N m.
-        after: with the causes, N m.
+        motion: the motion that the moment opposes or follows: ``1° of yaw``, or ``1 °/s of yaw rate``.
+        before: moment by the nominal model, N m.
+        after: moment with the causes, N m.
     """
 
     motion: str
@@ -42,7 +42,7 @@ class WhatItCosts(Finding):
 
     Args:
         wind_speed: the top speed, m/s.
-        moments: of the coefficients that the runs determine.
+        moments: moments of the coefficients that the runs determine.
     """
 
     after: ClassVar[str] = "uncertainty"
@@ -89,7 +89,7 @@ def _moment_per(name: str, run: Run, rig: RigProperties) -> float | None:
     """Moment in N m at one degree, or one degree per second, per unit of a coefficient.
 
     Args:
-        name: of the coefficient, times the sizes in its name, which the rig does not state.
+        name: name of the coefficient, times the sizes in its name, which the rig does not state.
     """
     rate = name.startswith("cn_r")
     if not (rate or name.startswith("cn_beta")) or run.air_density is None:
@@ -125,10 +125,10 @@ def _said(one: AirMoment) -> str:
 
 
 def _change(one: AirMoment) -> str:
-    """The change of a moment's size by the causes, in per cent of the nominal one; empty where one is at a bound.
+    """The change of a moment's size by the causes, in per cent of the nominal size; empty where one is at a bound.
 
-    ± spans the 95 % interval of the moment with the causes. The nominal moment is the number that the causes
-    change: its own deviation contains their error.
+    ± is the 95 % interval of the moment with the causes. The nominal moment is the reference that the causes
+    change, so its standard deviation is not included.
     """
     before, after = one.before, one.after
     if before.bound or after.bound or not before.value:
@@ -142,7 +142,7 @@ def _change(one: AirMoment) -> str:
     return f"{'+' if change > 0.0 else ''}{with_std(change, std)} %"
 
 
-_NO_CHANGE = 0.01  # %: a smaller one is stated as this
+_NO_CHANGE = 0.01  # %: a smaller change is stated as this
 
 
 @styled

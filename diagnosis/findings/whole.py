@@ -66,20 +66,20 @@ _LAST = (
 
 @dataclass(frozen=True)
 class Found:
-    """All facts of an answer that are not numbers of it.
+    """All facts of an answer that are not numeric results.
 
     Args:
-        place: reasons for the place of the gap; None where there is no gap, or no place.
+        place: reasons for the place of the gap; None without a gap, or without a place.
         nowhere: the residuals of a campaign without a gap; else None.
         both_winds: whether the wind is off in some runs and on in others.
         robot: whether the body is the joint of a machine, and not a body in a tunnel.
         driven: whether every run is driven.
-        nearly: effects that nearly explain an unexplained gap; None where there are none.
+        nearly: effects that nearly explain an unexplained gap; None if there are none.
         immaterial: by coefficient, the relative change by the causes, where they change none materially.
-        choices: springs, one of them off; the likeliest first.
+        choices: springs of which one is off; the most likely first.
         hold: a delay of the input that another hold between samples explains as well; None: none.
         rivals: causes from outside the vocabulary that would explain a gap of unknown cause.
-        second_modes: by run, where the gap is not explained.
+        second_modes: second modes by run, where the gap is not explained.
         limit_cycles: the remarks on the runs where every run is in a limit cycle; else none.
         noise: reasons for the noise used.
         cautions: caveats.
@@ -107,36 +107,37 @@ class Found:
 class Findings:
     """All findings of a diagnosis, as values with units: the one type that is written, shown and read back.
 
-    Its text fields are empty until `in_words` writes them: ``verdict``, ``cautions`` and ``note``, ``reason``,
-    ``words`` and ``notes`` of its parts.
+    Text fields are empty until `in_words` writes them: ``verdict``, ``cautions`` and ``note``, and ``reason``,
+    ``words`` and ``notes`` of the parts.
 
     Args:
         causes: effect names, sorted; empty: no gap; ``unknown``: a gap that no effect of the vocabulary explains.
         candidates: the answers considered, the answer first, ``none`` and ``unknown`` among them.
         ambiguous_with: effects that these runs cannot distinguish from the causes.
-        next_run: the run expected to distinguish them; None where not needed.
-        further_runs: that narrow the widest coefficient; None where none is wide by the noise of the readings.
-        confirmation: whether the fits' integrator agrees with the MuJoCo model, from which the gap is computed.
-        hidden: the effects that could hide, ordered by their move of a coefficient against its standard deviation.
+        next_run: the run expected to distinguish these effects; None where not needed.
+        further_runs: runs that narrow the widest coefficient; None where the noise leaves none wide.
+        confirmation: whether the fits' integrator agrees with the MuJoCo model, which computes the gap.
+        hidden: the effects that could hide, ordered by their move of a coefficient over its standard deviation.
         trade_off: the two parameters of the answer that the runs separate least; None where they separate all.
         blind_spots: what these runs cannot show, in sentences.
         seconds: wall time by step, s.
         maps: data of the figures; None for an answer without them.
         disturbed: disturbed runs; the answer excludes them from the disturbance on.
-        remarks: of the examination before the diagnosis, on runs left out, cut or to look at.
+        remarks: remarks of the examination on runs left out, cut, or to be checked.
         inclusion: by effect of the vocabulary, the probability that it is among the causes.
         rest: the remaining gap.
-        repeatability: of the runs; None for a single run, or a body without a spring.
+        repeatability: repeatability of the runs; None for a single run, or a body without a spring.
         model: the given model, with the causes written into it; None where none was given.
         closable: the explainable share of the rest, and its law; None where the rest is within chance.
         sizes: effect of each fitted cause on a swing.
         found: facts for the words, beside the numbers.
-        friction: of the answer against the rate, which is part of ``maps`` in the JSON; None without friction.
+        friction: friction of the answer against the rate; in the JSON it is part of ``maps``. None without
+            friction.
         data: the runs, which are not part of the JSON; None for an answer that was not made by `diagnose`.
         motion: ``displacement`` of a linear freedom, with m, N and kg in place of rad, N m and kg m² also in fields
             with ``_rad`` in their names; the JSON of an angle has neither it nor ``motion_scale``.
-        motion_scale: of the motion as it was computed: constants in the forms of effects, such as 0.2 rad, stand
-            for as many metres divided by it.
+        motion_scale: scale of the motion in the computation: a constant in the form of an effect, such as 0.2
+            rad, stands for as many metres divided by it.
     """
 
     campaign: str
@@ -183,7 +184,7 @@ class Findings:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the user's: of the campaign and its runs."""
+        """The names given by the user to the campaign and its runs."""
         return self.campaign, *(run.id for run in self.gap.runs)
 
     @property
@@ -251,7 +252,7 @@ class Findings:
 
     @property
     def set_out(self) -> str:
-        """The name of the answer whose parameters are stated, such as ``most probable answer``."""
+        """The name of the answer that supplies the stated parameters, such as ``most probable answer``."""
         if self.decided:
             return "answer"
         most = max(one.probability for one in self.candidates)
@@ -322,8 +323,8 @@ class Findings:
 
         Args:
             data: the document.
-            where: it is from, in an error.
-            remedy: in an error.
+            where: source of the document, for an error.
+            remedy: remedy, for an error.
 
         Raises:
             TunnelError: when it is of another version or not a diagnosis: a key or a setting is unknown, a key is
@@ -351,7 +352,7 @@ class Findings:
 
 
 def _unknown_keys(data: Any, known: Any) -> Iterator[str]:
-    """The places of the keys of a document that it lacks when it is written again."""
+    """The places of the document's keys that are lost when it is written again."""
     if isinstance(data, Mapping) and isinstance(known, Mapping):
         inner = {key: (value, known.get(key)) for key, value in data.items()}
         yield from (str(key) for key in data if key not in known)
@@ -364,14 +365,14 @@ def _unknown_keys(data: Any, known: Any) -> Iterator[str]:
 
 
 def _by_field(data: Mapping[str, Any]) -> dict[str, Any]:
-    """The document with the findings whose fields stand elsewhere in it."""
+    """The document, with findings that stand elsewhere in it also under their fields."""
     friction = (data.get("maps") or {}).get("friction")
     return {**data, "waterfall": data, "decision": data, "friction": friction}
 
 
 @cache
 def finding_kinds() -> dict[str, type[Finding]]:
-    """The findings that a diagnosis has a field for, by the name of the field."""
+    """The types of the findings for which a diagnosis has a field, by the name of the field."""
     kinds: dict[str, type[Finding]] = {}
     for name, hint in get_type_hints(Findings).items():
         found = [kind for kind in get_args(hint) if isinstance(kind, type) and issubclass(kind, Finding)]

@@ -28,17 +28,17 @@ small excess."""
 KINDS = (
     "angle", "rate", "state", "wind", "time", "reading", "line", "between", "event", "wander", "noise",
 )  # fmt: skip
-"""Kinds of missing law; ``noise`` where none of the others explains much."""
+"""Kinds of missing law; ``noise`` where no other kind explains much."""
 
 
 @dataclass(frozen=True)
 class Ceiling:
-    """The greatest share that one kind could explain.
+    """The greatest share that one kind of law could explain.
 
     Args:
-        kind: of `KINDS`.
+        kind: one of `KINDS`.
         closed: share of the residual, on held-out readings; negative where the prediction is worse.
-        std: its standard deviation from the scatter of the runs, a share.
+        std: standard deviation of the share, from the scatter of the runs.
     """
 
     kind: str
@@ -47,11 +47,11 @@ class Ceiling:
     held_out: str
 
     def determined(self) -> bool:
-        """Whether the share is known well enough; laws may explain more than all of a small excess."""
+        """Whether the share is known well enough; laws may explain more than the whole of a small excess."""
         return self.std < KNOWN_TO and self.closed < CLOSES_AT_MOST
 
 
-_WIDTHS = np.geomspace(1e-5, 1e3, 33)  # prior standard deviations tried, over a unit response's column
+_WIDTHS = np.geomspace(1e-5, 1e3, 33)  # tried prior standard deviations, over a unit response's column
 _TINY = 1e-10
 
 
@@ -61,7 +61,7 @@ class Normal:
 
     Args:
         matrix: free columns first, shape (c + k, c + k).
-        gradient: shape (c + k,).
+        gradient: gradient, shape (c + k,).
         power: sum of the squared residuals, dimensionless.
         free: number of columns without a prior.
     """
@@ -83,7 +83,7 @@ class Normal:
 
 
 def normal(residual: Array, basis: Array, free: Array | None = None) -> Normal:
-    """The normal equations of one unit (a run), its release projected out.
+    """The normal equations of one unit, its release projected out.
 
     Args:
         residual: shape (rows,).
@@ -107,10 +107,10 @@ def total(parts: Sequence[Normal]) -> Normal:
 
 @dataclass(frozen=True, eq=False)
 class Ridge:
-    """The solution for a prior of one width, coefficients independent and normal.
+    """The solution for a prior of one width; coefficients are independent and normal.
 
     Args:
-        precision: of the prior, one over the variance of a coefficient, in the basis' units.
+        precision: precision of the prior, one over the variance of a coefficient, in the basis' units.
     """
 
     normal: Normal
@@ -141,7 +141,7 @@ class Ridge:
 
 
 def _spectrum(whole: Normal) -> tuple[Array, Array]:
-    """Eigenvalues of the basis with the free columns taken out, and the gradient along their axes."""
+    """Eigenvalues of the basis with the free columns projected out, and the gradient along their axes."""
     c = whole.free
     a, b, d = whole.matrix[:c, :c], whole.matrix[:c, c:], whole.matrix[c:, c:]
     size = np.sqrt(np.maximum(np.diag(a), 1e-300))
@@ -169,7 +169,7 @@ def best_ridge(whole: Normal) -> Ridge:
 
 
 def held_out(parts: Sequence[Normal], groups: Sequence[Sequence[int]], precision: float | None) -> Array:
-    """χ² of every unit, predicted without its group; units in no group are fitted. Shape (units,).
+    """χ² of every unit, predicted without the unit's group; units in no group are fitted. Shape (units,).
 
     Args:
         groups: indices of the units left out together.
@@ -194,11 +194,11 @@ def held_out(parts: Sequence[Normal], groups: Sequence[Sequence[int]], precision
 
 
 def ratio(drop: Array, left: Array) -> tuple[float, float]:
-    """Share of the residual that is explained, and its standard deviation from the scatter of the units.
+    """Explained share of the residual, and its standard deviation from the scatter of the units.
 
     Args:
-        drop: of χ², by unit, shape (units,).
-        left: excess before, by unit, shape (units,).
+        drop: drop of χ², by unit, shape (units,).
+        left: excess before the drop, by unit, shape (units,).
     """
     whole = max(float(left.sum()), 1e-9)
     closed = float(drop.sum()) / whole
@@ -207,14 +207,14 @@ def ratio(drop: Array, left: Array) -> tuple[float, float]:
 
 
 GAPS = "short gaps"
-_STRETCHES = 6  # in a run, where no run can be held out
+_STRETCHES = 6  # number of stretches in a run, where no run can be held out
 _GAP = 3  # rows: an eighth of a cycle
 _TURNS = 3
 
 
 @dataclass(frozen=True, eq=False)
 class Unit:
-    """A part with a release of its own: a run, or a stretch of its rows."""
+    """A part with its own release: a run, or a stretch of its rows."""
 
     path: Path
     rows: slice
@@ -227,7 +227,7 @@ class Unit:
         """Rows of the unit, its release projected out.
 
         Args:
-            columns: of the whole run, shape (rows, k) or (rows,).
+            columns: columns of the whole run, shape (rows, k) or (rows,).
         """
         own = columns[self.rows]
         return np.asarray(own - self._release @ (self._release.T @ own))
@@ -250,7 +250,7 @@ class Evidence:
 
 
 class Unexplained:
-    """The residual of an answer's fit, and the share of it that could be explained."""
+    """The residual of an answer's fit, and the share of it that laws could explain."""
 
     def __init__(self, fit: Fit) -> None:
         self.fit = fit
@@ -296,16 +296,16 @@ class Unexplained:
 
     @cached_property
     def before(self) -> Array:
-        """χ² of every unit predicted without it by the model alone, shape (units,)."""
+        """χ² of every unit, predicted without it by the model alone, shape (units,)."""
         alone = self.normals([np.zeros((path.residual.size, 0)) for path in self.paths])
         return held_out(alone, self.groups, None)
 
     @cached_property
     def _left(self) -> Array:
-        """Excess that could be explained in every unit, shape (units,).
+        """Excess that laws could explain in every unit, shape (units,).
 
-        Averaged rows have less noise than the residuals but the whole misfit; a stretch's release absorbs
-        some.
+        Averaged rows have less noise than the residuals but the whole misfit; the release of a stretch absorbs
+        a part of it.
         """
         over, power = [], []
         for unit in self.units:
@@ -318,7 +318,7 @@ class Unexplained:
         return np.asarray(np.array(over) + (self.before - np.array(power)), np.float64)
 
     def common(self, kind: str) -> Evidence:
-        """A kind whose law is common to all runs; the scatter of the units gives the standard deviation."""
+        """A kind with one law for all runs; the scatter of the units gives the standard deviation."""
         parts = self.normals(self.columns(kind))
         ridge = best_ridge(total(parts))
         drop = (self.before - held_out(parts, self.groups, ridge.precision))[self.seen]
@@ -331,7 +331,7 @@ class Unexplained:
             unit.without_release(matrix) for unit, matrix in zip(self.runs, self.columns(kind), strict=True)
         ]
         residuals = [unit.without_release(unit.path.residual) for unit in self.runs]
-        # one precision of the prior, as in `Ridge`, for units with coefficients of their own
+        # one precision of the prior, as in `Ridge`, for units with their own coefficients
         spectra = [_spectrum(normal(r, c)) for r, c in zip(residuals, columns, strict=True)]
         greatest = max(max(values, default=0.0) for values, _ in spectra)
         tried = [greatest / float(width) for width in _WIDTHS**2] if greatest > 0.0 else [1e300]
@@ -349,5 +349,5 @@ class Unexplained:
 
 
 def gaps(size: int, group: int = 1) -> NDArray[np.int_]:
-    """The set of short gaps, left out in turn, of each of ``size`` samples, ``group`` in a row."""
+    """Sets of short gaps to be left out in turn; each gap has ``size`` samples, and ``group`` gaps are in a row."""
     return np.arange(size) // (_GAP * group) % _TURNS

@@ -1,8 +1,8 @@
 """Runs in wider blocks, which keep the motion in fewer numbers.
 
-Information on the causes is at or below a few times the frequency of the motion. Means over a block T at a
-frequency f keep (sin πfT / πfT)² of it: with 24 blocks in a cycle all but 0.6 %. Faster content is noise,
-unless the residuals of the nominal model show otherwise.
+Information on the causes is at or below a few times the frequency of the motion. A mean over a block T retains
+the share (sin πfT / πfT)² of the power at a frequency f: with 24 blocks in a cycle all but 0.6 %. Faster
+content is noise, unless the residuals of the nominal model show otherwise.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ BLOCK_LOSS: Final = 0.01
 """Maximum share of the gap that wider blocks may average out. Judgement. Causes differ by much larger
 shares."""
 
-_MOST = 16  # blocks that become one
+_MOST = 16  # maximum number of blocks joined into one
 _FAST = 0.4  # cycles in a wider block, above which its mean hides most of a line
 
 
 def compressed(nominal: Fit) -> Fit:
     """The nominal model fitted to its runs in wider blocks; unchanged where these would lose information.
 
-    They do so where a run is driven, its samples are not evenly spaced, it reads a derivative of the angle,
-    its noise is coloured, or its residuals contain a motion that is too fast for wider blocks.
+    They would lose information where a run is driven, its samples are not evenly spaced, it reads a derivative
+    of the angle, its noise is coloured, or its residuals contain a motion that is too fast for wider blocks.
 
     Args:
-        nominal: in the blocks in which the noise was tested.
+        nominal: the fit in the blocks used to test the noise.
     """
     data, chosen = nominal.problem.data, nominal.settings.selection
     counts = [
@@ -65,11 +65,11 @@ def in_shorter_blocks(found: Fit) -> Fit:
 
 
 def _joined(run: RunData, frequency: float, blocks: int) -> int:
-    """How many blocks of a run become one: a power of 2, so that similar runs are integrated together.
+    """Number of blocks of a run to join: a power of 2, so that similar runs are integrated together.
 
     Args:
-        frequency: of the run's motion, Hz.
-        blocks: fewest wider blocks in a cycle.
+        frequency: frequency of the run's motion, Hz.
+        blocks: minimum number of wider blocks in a cycle.
     """
     if not run.mergeable:
         return 1
@@ -81,8 +81,8 @@ def slow(residuals: list[Array], counts: list[int], chosen: SelectionSettings) -
     """Whether wider blocks keep nearly all of the residuals beyond noise, and every fast line.
 
     Args:
-        residuals: of the blocks, in noise standard deviations, by run, shape (n,).
-        counts: by run, how many blocks become one.
+        residuals: residuals of the blocks, in noise standard deviations, by run, shape (n,).
+        counts: number of blocks to join, by run.
     """
     excess, lost, freedom, lines, tried = 0.0, 0.0, 0, 0.0, 0
     for residual, count in zip(residuals, counts, strict=True):
@@ -92,7 +92,7 @@ def slow(residuals: list[Array], counts: list[int], chosen: SelectionSettings) -
         blocks = residual[: residual.size // count * count].reshape(-1, count)
         inside = blocks - blocks.mean(axis=1, keepdims=True)
         lost, freedom = lost + float(np.sum(inside**2)), freedom + blocks.size - len(blocks)
-        window = np.hanning(residual.size)  # its leakage from the motion does not reach fast lines
+        window = np.hanning(residual.size)  # leakage from the motion does not reach fast lines
         spectrum = np.fft.rfft(residual * window)[int(_FAST * residual.size / count) : -1]
         power = 2.0 * np.abs(spectrum) ** 2 / float(window @ window)  # χ² with two degrees of freedom
         lines, tried = max(lines, float(power.max())), tried + power.size

@@ -19,16 +19,17 @@ from diagnosis.settings import Settings
 from tunnel_sim.vocabulary.record import Array
 
 SHOWN_STDS: Final = 4.0
-"""Minimum size of an effect for single runs to show it, without a comparison of runs, in standard deviations.
+"""Minimum size of an effect, in standard deviations, for single runs to show it without a comparison of runs.
 Convention. One effect in 16,000 reaches this size by chance."""
 
 _MAX_ITERATIONS = 25
-_HOPELESS = 5  # steps after which a fit must be better than without the added effect
-_AT_BOUND = 1e-9  # relative: a step that would leave the range is cut to its end exactly
-_CORRECTIONS = 2  # of the runs' own parameters after a step
-_SINGULAR = 1e-12  # of the greatest eigenvalue: a smaller one is of a direction that the runs leave open
-_TAKES_PART = 1e-6  # of a unit vector: smaller parts are rounding
-_TRIES = 9  # dampings tried in a step, each ten times the last
+_HOPELESS = 5  # steps after which a fit must be better than the fit without the added effect
+_AT_BOUND = 1e-9  # relative: a step beyond the range is cut to its end exactly
+_CORRECTIONS = 2  # maximum number of further steps of the runs' own parameters
+# share of the greatest eigenvalue: a smaller eigenvalue belongs to an undetermined direction
+_SINGULAR = 1e-12
+_TAKES_PART = 1e-6  # share of a unit vector: smaller parts are rounding
+_TRIES = 9  # number of tried dampings in a step, each ten times the previous one
 
 
 class FitError(ArithmeticError):
@@ -41,13 +42,14 @@ class Fit:
 
     Args:
         residuals: reading minus prediction in noise standard deviations, by run.
-        chi2: sum of their squares, by run, shape (runs,).
-        covariance: of the common parameters for the assumed noise, releases eliminated, shape (common, common).
-        jacobian: of the scaled residuals' prediction with respect to the common parameters, by run, shape
-            (n, common), and to the run's release, shape (n, 2).
+        chi2: sum of squared residuals, by run, shape (runs,).
+        covariance: covariance of the common parameters for the assumed noise, releases eliminated, shape
+            (common, common).
+        jacobian: derivatives of the scaled prediction to the common parameters, by run, shape (n, common), and
+            to the run's release, shape (n, 2).
         converged: whether the last step reduced χ² negligibly.
-        spread: covariance to be added for other minima of χ², of that shape; None: there are none. Linear
-            theory from the fit's own minimum uses ``covariance`` alone.
+        spread: covariance to be added for other minima of χ², shape (common, common); None: there are none.
+            Linear theory from the fit's own minimum uses ``covariance`` alone.
     """
 
     problem: Problem
@@ -95,11 +97,11 @@ class Fit:
         return self.columns.likeliest(width_prior(self.problem), self.widths)
 
     def scatter_cost(self, deviation_precision: Array) -> float:
-        """−2 ln of the evidence of the chance differences between the runs, without χ²; 0 without any.
+        """−2 ln of the evidence of the chance differences between the runs, without χ²; 0 if the runs repeat.
 
         Args:
-            deviation_precision: precision of these differences as the runs show them, as in `Between.cost`, shape
-                (runs, kinds, kinds).
+            deviation_precision: precision of these differences in the runs, as in `Between.cost`, shape (runs,
+                kinds, kinds).
         """
         return 0.0 if self.between is None else self.between.cost(deviation_precision, self.shown)
 
@@ -116,7 +118,7 @@ class Fit:
 
     @cached_property
     def _shown_by_runs(self) -> dict[str, bool]:
-        """Whether single runs show an effect: its size differs from zero by their evidence alone."""
+        """Whether single runs show an effect: without comparing runs, its size differs from zero."""
         if self.between is None:
             return {}
         shown = self.between.shown(self.point.common, SHOWN_STDS)
@@ -126,7 +128,7 @@ class Fit:
 
     @property
     def unlikelihood(self) -> float:
-        """−2 ln L up to a constant: χ² where the runs repeat, else with their deviations integrated out.
+        """−2 ln L up to a constant: χ² if the runs repeat, else with their deviations integrated out.
 
         It uses the fit's own point and widths, because linear theory is unreliable far from a minimum.
         """
@@ -152,7 +154,7 @@ class Fit:
 
     @property
     def gap(self) -> float:
-        """The unit of shares: the excess, at least 0.001."""
+        """The unit for shares: the excess, at least 0.001."""
         return max(self.excess, 1e-3)
 
     @property
@@ -189,9 +191,10 @@ class Fit:
     def left_open(self) -> Array | None:
         """Covariance along the directions that the runs leave open, shape (common, common); None without any.
 
-        ``covariance`` is a pseudo-inverse, with a variance of zero along them. The distribution along an open
-        direction is uniform as far as the parameters' bounds allow, such as the shares of viscous and structural
-        loss in the damping of a single spring. A parameter without any effect on the readings is not counted.
+        ``covariance`` is a pseudo-inverse, with a variance of zero along these directions. Along each of them
+        the distribution is uniform as far as the parameters' bounds allow; an example is the split of the
+        damping of a single spring between viscous and structural loss. A parameter without any effect on the
+        readings is not counted.
         """
         none = [np.zeros(common.shape[0]) for common, _ in self.jacobian]
         matrix, _, _ = normal_equations(self.jacobian, none, products=self.products)
@@ -208,12 +211,12 @@ class Fit:
             low, high = self._range(along)
             far = 1.0 / math.sqrt(least)
             low, high = max(low, -far), min(high, far)
-            square = (high * high + high * low + low * low) / 3.0  # mean, about the fit
+            square = (high * high + high * low + low * low) / 3.0  # mean relative to the fit
             found += square * np.outer(along, along)
         return found if found.any() else None
 
     def _range(self, along: Array) -> tuple[float, float]:
-        """The least and the greatest multiple of a direction by which the parameters may move within bounds."""
+        """The least and the greatest multiple of a direction that keep the parameters within bounds."""
         moves = along != 0.0
         ends = [(limits - self.point.common)[moves] / along[moves] for limits in self.problem.bounds]
         return float(np.minimum(*ends).max()), float(np.maximum(*ends).min())
@@ -240,8 +243,8 @@ def fit(
     """Minimise χ² from a starting point.
 
     Args:
-        base: a fit of the same runs with fewer effects. While the fit converges quickly, the sensitivities of
-            shared parameters are taken from it, which saves most of the simulations.
+        base: a fit of the same runs with fewer effects. While the fit converges quickly, the base supplies the
+            sensitivities of the shared parameters, which saves most of the simulations.
         tolerance: the fit continues while a step lowers χ² by this share, or by 0.1.
 
     Raises:
@@ -261,11 +264,11 @@ def fit(
             else gain < max(0.1, tolerance * state.here.cost)
         )
         if poor and borrowed:
-            borrowed = False  # repeat with its own sensitivities
+            borrowed = False  # repeat with new sensitivities
         elif poor:
             converged = True
         if base is not None and iterations >= _HOPELESS and state.here.cost > base.total:
-            break  # worse than without its further parameters
+            break  # worse than without the further parameters
     return state.result(converged)
 
 
@@ -343,8 +346,8 @@ class _State:
     def _corrected(self, trial: _Place) -> _Place:
         """A trial with the runs' own parameters fitted once more.
 
-        Where runs differ by chance, deviations absorb a long step of the common parameters, so it is cheap.
-        To first order they absorb all but some thousandths of it, which is far above the noise.
+        Where runs differ by chance, deviations absorb a long step of the common parameters, so the step costs
+        little. To first order they absorb all but some thousandths of it; but these are far above the noise.
         """
         for _ in range(_CORRECTIONS):
             pull = self.problem.parameters.pull(trial.point)
@@ -388,7 +391,7 @@ def scaled_residuals(problem: Problem, point: Point) -> list[Array]:
 
 
 def _scaled(problem: Problem, prediction: list[Array]) -> list[Array]:
-    with np.errstate(invalid="ignore", over="ignore"):  # a run that diverged; its cost is infinite
+    with np.errstate(invalid="ignore", over="ignore"):  # a run that diverged has an infinite cost
         return [
             run.scaled(run.reading - values)
             for run, values in zip(problem.data.runs, prediction, strict=True)

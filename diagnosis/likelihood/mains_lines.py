@@ -1,4 +1,4 @@
-"""Where the mains show in residuals: at 50 or 60 Hz and their multiples, as sampled.
+"""Mains lines in residuals: at 50 or 60 Hz and their multiples, as sampled.
 
 A line above half the sample rate appears at another frequency, because the spectrum of samples repeats: 60 Hz
 sampled at 100 Hz appears at 40 Hz. Every line is therefore sought at its own frequency less the nearest
@@ -28,31 +28,32 @@ from tunnel_sim.vocabulary.record import Array
 
 #: Nominal frequencies of the mains, Hz.
 MAINS = (50.0, 60.0)
-#: Their multiples that are sought. Rectifiers and lamps give the even ones, transformers the odd ones.
+#: The multiples to be searched. Rectifiers and lamps give the even multiples, transformers the odd ones.
 HARMONICS = range(1, 6)
-#: Greatest deviation of the mains, a share of their frequency: a grid that is not synchronously connected to
+#: Greatest deviation of the mains, a share of their frequency: a grid without a synchronous connection to
 #: others keeps 50 Hz within 2 % during 95 % of a week (EN 50160:2010, 4.2.1).
 _WANDER = 0.02
 #: Smallest search range, a share of the frequency: large grids keep 50 Hz within 1 % during 99.5 % of a year
 #: (EN 50160:2010, 4.2.1) and 60 Hz within 0.5 Hz (NERC PRC-024-3, no-trip zone).
 _LEAST_WANDER = 0.01
-#: Largest share of the spectrum beyond the motion's harmonics in which one line may be sought, on either side
-#: of its place. In a narrow spectrum a line of another source often lies in a wider range. Judgement.
+#: Largest search range of one line on either side, as a share of the spectrum beyond the motion's harmonics.
+#: In a narrow spectrum a wider range often contains a line of another source. Judgement.
 _OF_SPECTRUM = 0.05
-_BEYOND_MOTION = 3.3  # times the frequency of the fastest motion: beyond its third harmonic by a tenth
+_BEYOND_MOTION = 3.3  # multiple of the fastest motion's frequency: beyond its third harmonic by a tenth
 _WIDTH = 2.0  # half a line's width with a Hann window, in 1/duration
-#: Length of the pieces whose powers are added, s of the rig as measured: the mains' phase is steady within
-#: them. A standard measurement of the mains' frequency takes as long (IEC 61000-4-30:2015, 5.1).
+#: Length of the pieces for adding powers, s of the rig as measured: the mains' phase is steady within a piece.
+#: A standard measurement of the mains' frequency takes as long (IEC 61000-4-30:2015, 5.1).
 _PIECE = 10.0
-_LEAST_PIECE = 2.0  # s of the similar rig: four cycles
+_LEAST_PIECE = 2.0  # minimum length of a piece, s of the similar rig: four cycles
 _PADDING = 8
 _BESIDE = (
     0.6,
     4.0,
 )  # Hz of the similar rig: least and greatest distance of the spectrum compared with a line
-_MOTION_KNOWN = 1e-3  # of a multiple of the motion's frequency, which changes a little with the amplitude
+# share of a multiple of the motion's frequency, which changes a little with the amplitude
+_MOTION_KNOWN = 1e-3
 _SAME = 1e-6  # cycles per sample
-_CLEAR = 3.0  # or this many 1/duration of a piece, where it is more
+_CLEAR = 3.0  # or this multiple of 1/duration of a piece, if it is larger
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,22 +62,22 @@ class MainsLine(SpectralLine):
 
     Args:
         parameter: frequency of the mains, Hz.
-        drop: of χ² when the line is removed from the runs concerned, dimensionless.
+        drop: drop of χ² when the line is removed from the runs concerned, dimensionless.
         contrast: ratio of the drop at the line to the greatest drop beside it, dimensionless.
-        amplitude: of the line at the sensor, rad, root mean square over the runs concerned.
+        amplitude: amplitude of the line at the sensor, rad, root mean square over the runs concerned.
         phases: of sine, rad, by run, shape (runs,); zero for runs not concerned.
         harmonic: the multiple.
-        concerned: numbers of the runs in which it is sought.
-        freedom: twice the number of pieces of records whose powers are added.
-        trials: number of independent places at which mains lines were sought, over all lines.
+        concerned: numbers of the runs that are searched for the line.
+        freedom: twice the number of pieces of records with added powers.
+        trials: number of independent places searched for mains lines, over all lines.
         powers: drop of χ² of every run concerned, dimensionless, shape (concerned,).
         pieces: number of pieces of every run concerned, shape (concerned,).
         later: power in the later halves of these runs over the power in the earlier halves, dimensionless.
         evidence: drop of χ² beyond chance, at all visible multiples of the frequency, dimensionless.
         folds: number of times the line is folded, in the run of the lowest sample rate.
-        beside: p-value of the clearest lower multiple that is visible; 1 where none is.
-        covered: share of the visible spectrum in which mains lines as plain as this one are sought: the probability
-            that a line of another source is taken for it.
+        beside: p-value of the clearest visible lower multiple; 1 if there is none.
+        covered: share of the visible spectrum searched for mains lines as plain as this one: the probability
+            that a line of another source is mistaken for it.
     """
 
     harmonic: int
@@ -93,7 +94,7 @@ class MainsLine(SpectralLine):
 
     @property
     def plainness(self) -> tuple[int, int]:
-        """Number of foldings, and the multiple: the less, the less far-fetched."""
+        """Number of foldings, and the multiple: smaller numbers are more plausible."""
         return self.folds, self.harmonic
 
 
@@ -114,7 +115,7 @@ def resolvable(frequency: float | Array, interval: float, duration: float, motio
     Args:
         frequency: Hz, any shape.
         interval: between samples, s.
-        duration: over which the line is resolved, s.
+        duration: length of the record that resolves the line, s.
         motion: frequency of the motion, Hz.
     """
     shown = np.abs(apparent(frequency, interval))
@@ -128,7 +129,7 @@ def shown_multiples(frequency: float, interval: float, duration: float, motion: 
     Args:
         frequency: of the mains, Hz.
         interval: between samples, s.
-        duration: over which a line is resolved, s.
+        duration: length of the record that resolves a line, s.
         motion: frequency of the fastest motion, Hz.
     """
     found: list[int] = []
@@ -143,7 +144,7 @@ def shown_multiples(frequency: float, interval: float, duration: float, motion: 
 
 
 def _limits(interval: float, duration: float, motion: float) -> tuple[float, float]:
-    """Lowest and highest apparent frequency of a line that is sought, Hz."""
+    """Lowest and highest apparent frequency in the search for a line, Hz."""
     return _BEYOND_MOTION * motion + _WIDTH / duration, 0.5 / interval - _WIDTH / duration
 
 
@@ -158,7 +159,7 @@ def alike(frequency: float, harmonic: int, intervals: list[float]) -> float | No
 
     Args:
         frequency: of the mains, Hz of the rig as measured.
-        harmonic: multiple of it at which the line is.
+        harmonic: multiple of the frequency at which the line is.
         intervals: between samples, s of the rig as measured, by record.
     """
     rate, line = 1.0 / intervals[0], harmonic * frequency
@@ -182,9 +183,9 @@ class _Pieces:
         power: sum over the pieces of the drop of χ² when a sine is removed, by frequency, shape (n,).
         halves: the parts of ``power`` from the earlier and the later half of the run, shape (2, n).
         spacing: between the frequencies, Hz.
-        count: of the pieces.
-        duration: of one, s.
-        run: the run.
+        count: number of pieces.
+        duration: length of a piece, s.
+        run: the run that is cut.
         motion: frequency of the fastest motion, Hz.
         own: frequency of the run's own motion, Hz.
     """
@@ -233,7 +234,7 @@ class _Pieces:
         return resolvable(frequency, self.run.interval, self.duration, self.motion)
 
     def reach(self, frequency: float) -> float:
-        """Search range about a frequency, a share of it; 0 where the line is not sought."""
+        """Search range about a frequency, as a share of it; 0 where the line is not searched for."""
         lowest, highest = _limits(self.run.interval, self.duration, self.motion)
         share = min(_WANDER, _OF_SPECTRUM * (highest - lowest) / frequency)
         ends = frequency * (1.0 + share * np.array([-1.0, 0.0, 1.0]))
@@ -253,7 +254,7 @@ def mains_lines(fit: Fit, stated: float = 0.0) -> list[MainsLine]:
     Ordered by nominal frequency, then by multiple.
 
     Args:
-        stated: nominal frequency of the mains, Hz of the rig as measured; 0: not stated, and both are sought.
+        stated: nominal frequency of the mains, Hz of the rig as measured; 0: not stated, and both are tried.
     """
     data = fit.problem.data
     length = max(data.similarity.similar(_PIECE, "s"), _LEAST_PIECE)
@@ -279,7 +280,7 @@ def mains_line(fit: Fit) -> MainsLine | None:
 def _sought(
     runs: list[_Pieces], similarity: Similarity, mains: Sequence[float]
 ) -> Iterator[tuple[float, int, float, tuple[int, ...]]]:
-    """Nominal frequency (Hz), multiple, range (a share) and run numbers of every line that is sought.
+    """Nominal frequency (Hz), multiple, range (a share) and run numbers of every line of the search.
 
     Args:
         mains: the nominal frequencies, Hz of the rig as measured.
@@ -312,7 +313,7 @@ def _foldings(
 def _share_of_spectrum(
     runs: list[_Pieces], nominal: float, harmonic: int, reach: float, concerned: tuple[int, ...]
 ) -> float:
-    """Width of a range as a share of the visible spectrum beyond the motion, in the run where it is largest."""
+    """Width of a range as a share of the visible spectrum beyond the motion, in the run with the largest share."""
     width, shares = 2.0 * reach * harmonic * nominal, []
     for i in concerned:
         lowest, highest = _limits(runs[i].run.interval, runs[i].duration, runs[i].motion)
@@ -329,7 +330,7 @@ def _line(
     concerned: tuple[int, ...],
     trials: float,
 ) -> MainsLine | None:
-    """The strongest line in a range; None where no spectrum beside it is visible."""
+    """The strongest line in a range; None without a visible spectrum beside it."""
     among = [runs[i] for i in concerned]
     spacing = min(run.spacing for run in among)
     middle = harmonic * nominal
@@ -349,18 +350,19 @@ def _line(
     spectra = [whole[i] for i in concerned]
     refined = _refined(among, spectra, place)
     orders = [run.of_motion(refined) for run in among]
-    if all(orders):  # at a multiple of every run's motion, and none stands far above all others
+    # a line at a multiple of every run's motion must stand out from the other multiples
+    if all(orders):
         floor = max(floor, sum(run.multiples(order) for run, order in zip(among, orders, strict=True)))
     sines = _sines(among, spectra, refined)
     phases = np.zeros(len(runs))
-    # a transform is of cos − i sin: a sine a sin(ωt + φ) gives a exp(i(φ − π/2))
+    # the transform is by cos − i sin: a sine a sin(ωt + φ) gives a exp(i(φ − π/2))
     phases[list(concerned)] = np.angle(sines) + np.pi / 2
     frequency = refined / harmonic
     return MainsLine(
         frequency,
         float(powers.sum()),
         float(powers.sum()) / max(floor, 1e-9),
-        # the smoothed transform keeps the noise's level: lines lose a third of it
+        # the smoothed transform retains the noise level: lines lose a third of it
         float(np.sqrt(1.5 * np.mean(np.abs(sines) ** 2))),
         phases,
         harmonic=harmonic,

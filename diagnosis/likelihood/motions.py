@@ -33,8 +33,9 @@ from tunnel_sim.physics.steps import compensated, fit_stride, fit_substeps, inpu
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig
 
-_TOGETHER = 16  # motions in a part of the work, a multiple of the integrator's number side by side
-_STEPS_OF_A_THREAD = 3e4  # in a part: about a millisecond, several times its overhead
+# motions in a part of the work, a multiple of the number that the integrator runs side by side
+_TOGETHER = 16
+_STEPS_OF_A_THREAD = 3e4  # minimum number of steps in a part: about a millisecond, several times its overhead
 _SOFT_ROD = 2e-5  # rad/(N m): the ringing of a stiffer rod at the release is below the noise
 #: Parameters of the law without effect in still air, and fields of a run that point to samples.
 _AIR = (
@@ -50,13 +51,13 @@ class Asked:
     """Runs to be predicted; one run may occur several times with different parameters.
 
     Args:
-        data: of the campaign.
+        data: the campaign's data.
         runs: shape (n,), as for all fields below.
-        stated: their physics without any effect.
-        physics: with the effects.
-        effects: that act in each run.
-        drawn: the random part of each of these effects.
-        zero: of the sensor, in the unit of the reading, shape (n,).
+        stated: the physics of the runs without any effect.
+        physics: the physics of the runs with the effects.
+        effects: the effects that act in each run.
+        drawn: the random part of each effect.
+        zero: zero of the sensor, in the unit of the reading, shape (n,).
         resolve_rod_mode: as in `Problem`.
     """
 
@@ -80,12 +81,12 @@ class CompiledRuns:
 
     Args:
         law: shape (n, parameters), in the law's order.
-        rows: of `run_dtype`, shape (n,).
-        kept: arrays that the rows point to, beside ``winds``, by run: first the samples of its wind, or the values
-            and slopes of its input.
+        rows: rows of `run_dtype`, shape (n,).
+        kept: arrays that the rows point to, apart from ``winds``, by run: first the samples of its wind, or the
+            values and slopes of its input.
         winds: wind speeds that the rows point to, m/s, shape (n,).
         blocks: duration of each motion in block means, shape (n,).
-        ringing: of a rod, to be added, by run.
+        ringing: ringing of a rod, to be added, by run.
     """
 
     law: Array
@@ -100,7 +101,7 @@ class CompiledRuns:
         """The motions of some runs.
 
         Args:
-            like: period after which the same runs follow at another point, which uses the steps of the first;
+            like: period after which the same runs follow at another point with the steps of the first point;
                 None: each run has its own steps.
         """
         physics, runs, rig, count = (
@@ -204,7 +205,7 @@ class CompiledRuns:
         samples = self.blocks[places] + 1
         angle, rate, status = integrate(self.law[places], self.rows[places], samples)
         first = 0
-        while status:  # one of them diverged, and the later ones are not done
+        while status:  # one motion diverged, and the later ones are not done
             angle[first + status - 1], rate[first + status - 1] = np.inf, np.inf
             first += status
             if first == len(places):
@@ -238,7 +239,8 @@ def side_by_side(
 ) -> None:
     """Run some work on parts of a campaign's runs, in as many threads as the settings allow.
 
-    Only the integrator works beside another thread. Short parts would wait for the interpreter: one does them all.
+    Only the integrator runs in parallel. Short parts would wait for the interpreter, so one thread does them
+    all.
     """
     threads = data.settings.work.threads
     steps = float(np.max(motions.blocks * motions.rows["steps"] / motions.rows["stride"], initial=0.0))
@@ -254,7 +256,7 @@ def _pool(threads: int) -> ThreadPoolExecutor:
 def read_together(
     asked: Asked, motions: CompiledRuns, members: list[tuple[int, int]], angle: Array, rate: Array
 ) -> list[Array]:
-    """Block means of the reading of runs whose motions were integrated together.
+    """Block means of the reading, from motions that were integrated together.
 
     Args:
         members: for each run, the index of its motion and its own index.
@@ -282,7 +284,7 @@ def read_together(
     means = {number: mean[: blocks[number]] for number, mean in zip(steady, of_steady, strict=True)}
     for number, (chain, run) in enumerate(zip(chains, runs, strict=True)):
         zero = float(asked.zero[places[number]])
-        if not np.isfinite(angle[number, 0]):  # it diverged
+        if not np.isfinite(angle[number, 0]):  # the motion diverged
             found.append(np.full(run.reading.size, np.inf))
         elif chain.skips:
             ends = np.arange(blocks[number] + 1, dtype=np.float64) * run.interval
@@ -294,12 +296,12 @@ def read_together(
 
 
 def _lines(inputs: Mapping[int, InputMoment], step: Array, steps: Array, like: int) -> dict[int, Lines]:
-    """The inputs of driven runs as lines, which begin at equal times for a run and its like.
+    """The inputs of driven runs as lines; a run and its counterparts start them at the same times.
 
     Args:
         inputs: by place, without actuators.
-        step: of every run, s, shape (n,).
-        steps: their number, shape (n,).
+        step: step of every run, s, shape (n,).
+        steps: number of steps, shape (n,).
         like: period after which the same runs follow.
     """
     apart = set()
@@ -315,12 +317,13 @@ def _lines(inputs: Mapping[int, InputMoment], step: Array, steps: Array, like: i
 
 
 def end_weights(runs: Sequence[RunData], blocks: int) -> Array:
-    """Weights of a block's first and last angle, and first and last rate per interval, in its mean.
+    """Weights with which the angles and rates at a block's ends enter its mean.
 
-    Shape (runs, 4, 1), or (runs, 4, blocks) where samples are not evenly spaced; 0 beyond the end of a run.
+    For the first and last angle, and the first and last rate times the interval. Shape (runs, 4, 1), or (runs,
+    4, blocks) where samples are not evenly spaced; 0 beyond the end of a run.
 
     Args:
-        blocks: of the longest run.
+        blocks: number of blocks of the longest run.
     """
     if all(run.samples is None for run in runs):
         return np.stack([run.weights for run in runs])[:, :, None]
@@ -335,12 +338,12 @@ def block_means(runs: Sequence[RunData], angle: Array, rate: Array) -> Array:
     """Block means of the angle, or of the derivative that is read, from the block ends, shape (runs, blocks).
 
     Args:
-        angle, rate: at the blocks' ends, rad and rad/s, shape (runs, blocks + 1). Those beyond the end of a
-            run have no meaning, nor have their means.
+        angle, rate: at the blocks' ends, rad and rad/s, shape (runs, blocks + 1). Values and means beyond the
+            end of a run have no meaning.
     """
     weights = end_weights(runs, angle.shape[1] - 1)
     interval = np.array([run.interval for run in runs])[:, None]
-    with np.errstate(invalid="ignore"):  # a motion that diverged
+    with np.errstate(invalid="ignore"):  # the motion diverged
         found: Array = (
             weights[:, 0] * angle[:, :-1]
             + weights[:, 1] * angle[:, 1:]
@@ -353,7 +356,7 @@ def block_means(runs: Sequence[RunData], angle: Array, rate: Array) -> Array:
 def _apart(
     physics: SettingsTable, place: int, asked: Asked, rig: Rig
 ) -> tuple[float, float, float, Ringing] | None:
-    """Replace a run with a flexible rod by its slow motion, or a rod that is followed but too stiff by a rigid one.
+    """Replace a run with a flexible rod by its slow motion, or a stiff rod that would be resolved by a rigid one.
 
     Returns:
         The body's lead, the rod's stiffness (N m/rad), the body's release angle (rad) and the ringing to be
@@ -369,7 +372,7 @@ def _apart(
 
 
 def blocks_beyond(physics: RunSettings, run: RunData) -> int:
-    """Blocks by which a motion must outlast the record: 0 unless an effect reads it after the end."""
+    """Blocks by which a motion must extend beyond the record: 0 unless an effect reads it after the end."""
     return int(np.ceil(max(0.0, physics.duration - run.duration) / run.interval))
 
 
@@ -377,8 +380,8 @@ def sample_means(chain: EffectChain, motion: Motion, run: RunData, zero: float) 
     """Block means of the reading, rad, sample by sample.
 
     Args:
-        motion: at the blocks' ends.
-        zero: of the sensor, rad.
+        motion: angle and rate at the blocks' ends.
+        zero: zero of the sensor, rad.
     """
     reading = chain.reading(chain.sensed(motion, run.sample_times, run.derivative) + zero)
     return run.means(reading)

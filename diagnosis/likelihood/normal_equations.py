@@ -17,9 +17,10 @@ class Products:
     """Products of the sensitivities, computed once per point.
 
     Args:
-        own: of every run's own with themselves, and the precision of their priors, shape (runs, own, own).
-        mixed: of the own with the common, shape (runs, own, common).
-        common: of the common with themselves, by run, shape (runs, common, common).
+        own: each run's own sensitivities with themselves, plus the precision of their priors, shape (runs, own,
+            own).
+        mixed: the own sensitivities with the common ones, shape (runs, own, common).
+        common: the common sensitivities with themselves, by run, shape (runs, common, common).
     """
 
     own: Array
@@ -28,10 +29,10 @@ class Products:
 
     @classmethod
     def of(cls, jacobian: list[tuple[Array, Array]], precision: Array | None = None) -> Products:
-        """The products of sensitivities, as `sensitivities` gives them.
+        """The products of the results of `sensitivities`.
 
         Args:
-            precision: of the own parameters' priors, shape (own,); None: they have none.
+            precision: precision of the own parameters' priors, shape (own,); None: they have none.
         """
         own = np.stack([release.T @ release for _, release in jacobian])
         return cls(
@@ -69,10 +70,10 @@ def by_run(
 
     Args:
         jacobian: from `sensitivities`.
-        residuals: scaled.
-        damping: of the release's own step, as a share of its diagonal.
-        products: of the jacobian, where they are known.
-        pull: of the own parameters' priors, shape (runs, own), as `ParameterSet.pull`; None: none.
+        residuals: scaled residuals.
+        damping: damping of the release's step, as a share of its diagonal.
+        products: products of the jacobian, if known.
+        pull: pull of the own parameters' priors, shape (runs, own), as `ParameterSet.pull`; None: none.
 
     Returns:
         Matrices, shape (runs, common, common), gradients, shape (runs, common), and the solutions of
@@ -108,8 +109,8 @@ def damped_step(
         residuals: scaled, by run.
         jacobian: from `sensitivities`, of the same rows as the residuals.
         damping: added to the scaled normal matrix's diagonal, dimensionless.
-        products: of the jacobian, where they are known.
-        linear: whether the residuals are a change from an optimum, at which priors and readings are in balance.
+        products: products of the jacobian, if known.
+        linear: whether the residuals are a change from an optimum at which priors and readings are in balance.
     """
     parameters = problem.parameters
     known = Products.of(jacobian, parameters.precision) if products is None else products

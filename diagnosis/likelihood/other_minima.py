@@ -1,7 +1,7 @@
 """Other minima of χ², and their contribution to a fit's covariance.
 
-An effect names other values that change the slow motion alike (`Effect.alike`). χ² may have a narrow minimum
-at each of them, as at every frequency of a rod's ringing, so that Gauss–Newton steps do not lead from one to
+An effect names other values that change the slow motion alike (`Effect.alike`). χ² may have a narrow minimum at
+each of them, for example at every frequency of a rod's ringing. Gauss–Newton steps then do not lead from one to
 another.
 """
 
@@ -18,7 +18,7 @@ from diagnosis.model.parameters import Point
 from tunnel_sim.vocabulary.record import Array
 
 _TOGETHER = 16  # points predicted at once: a campaign's predictions fill memory
-_REFITTED = 3  # of the best points, since linear theory does not show the deepest
+_REFITTED = 3  # number of best points that are fitted, since linear theory does not show the deepest
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,9 +26,9 @@ class _Elsewhere:
     """Other values of an effect's parameters.
 
     Args:
-        point: with the other parameters moved by linear theory.
+        point: the point with the other parameters moved by linear theory.
         total: χ² there, by linear theory.
-        held: indices of the common parameters that were not moved.
+        held: indices of the fixed common parameters.
     """
 
     point: Point
@@ -41,11 +41,11 @@ def deepest(fitted: Fit, *, tolerance: float = 1e-4) -> Fit:
 
     Args:
         fitted: a fit that may be in another minimum.
-        tolerance: share of χ² by which a step must lower it for a fit to continue, as in `fit`.
+        tolerance: minimum drop of χ² in a step, as a share of χ², for a fit to continue, as in `fit`.
 
     Returns:
-        The fit of least χ². Its stated covariance includes the other minima, each by its likelihood, since
-        the deepest of many shallow minima may be so by chance.
+        The fit of least χ². Its stated covariance includes the other minima, each by its likelihood: among many
+        shallow minima, chance may decide which is the deepest.
     """
     found = _elsewhere(fitted)
     if not found:
@@ -65,7 +65,7 @@ def _elsewhere(fitted: Fit) -> list[_Elsewhere]:
     for effect in problem.effects_at(common):
         for trial in effect.alike():
             names = {f"{effect.name}.{name}": value for name, value in trial.values.items()}
-            if not names.keys() <= set(problem.names):  # some are fixed
+            if not names.keys() <= set(problem.names):  # some parameters are fixed
                 continue
             at = common.copy()
             at[[problem.names.index(name) for name in names]] = list(names.values())
@@ -85,7 +85,7 @@ def _elsewhere(fitted: Fit) -> list[_Elsewhere]:
 
 
 def _by_linear_theory(fitted: Fit, point: Point, residuals: list[Array], held: list[int]) -> _Elsewhere:
-    """The point with all parameters but the fixed ones moved, by the sensitivities of the fit."""
+    """The point with all but the fixed parameters moved, by the sensitivities of the fit."""
     jacobian = []
     for columns, own in fitted.jacobian:
         free = columns.copy()
@@ -101,9 +101,10 @@ def _by_linear_theory(fitted: Fit, point: Point, residuals: list[Array], held: l
 
 
 def _with_spread(fitted: Fit, found: list[_Elsewhere]) -> Fit:
-    """The fit whose stated covariance includes the distance of other likely minima.
+    """The fit, with its stated covariance including the distance to other likely minima.
 
-    The part of it that follows from the curvature of the fit's own minimum is already in the covariance.
+    The curvature of the fit's own minimum is already in the covariance; the part that follows from it is left
+    out.
     """
     std = np.sqrt(np.maximum(np.diag(fitted.covariance), 1e-300))
     weights, spread = [1.0], np.zeros_like(fitted.covariance)

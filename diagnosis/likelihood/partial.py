@@ -1,4 +1,4 @@
-"""Fits of some of the readings, or of some of the parameters, from the fit of all."""
+"""Fits of some of the readings, or of some of the parameters, that start from the fit of all."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from diagnosis.model.parameters import Point
 from tunnel_sim.vocabulary.record import Array
 
 _STEPS = 6  # Gauss–Newton steps without a group
-_TRIES = 4  # dampings tried in a step
-_GAIN = 1e-4  # least drop of χ² in a step, as a share of it
-_RELEASE_STEPS = 4  # two are enough with slopes at nearly the same parameters
-_RELEASE_GAIN = 1e-6  # least drop of a run's χ² in a step, as a share of it
+_TRIES = 4  # number of tried dampings in a step
+_GAIN = 1e-4  # minimum drop of χ² in a step, as a share of χ²
+_RELEASE_STEPS = 4  # two steps are enough with slopes at nearly the same parameters
+_RELEASE_GAIN = 1e-6  # minimum drop of a run's χ² in a step, as a share of χ²
 
 
 def refit_releases(problem: Problem, start: Point, slopes: list[Array]) -> tuple[Point, list[Array]]:
@@ -29,7 +29,7 @@ def refit_releases(problem: Problem, start: Point, slopes: list[Array]) -> tuple
             at nearly the same parameters.
 
     Returns:
-        The point found, each run at its own best, and the scaled residuals there by run.
+        The point with each run's best parameters, and the scaled residuals there by run.
     """
     best, residuals = start, scaled_residuals(problem, start)
     root = np.sqrt(problem.parameters.precision)
@@ -43,7 +43,7 @@ def refit_releases(problem: Problem, start: Point, slopes: list[Array]) -> tuple
             steps.append(np.linalg.lstsq(rows, values, rcond=1e-10)[0])
         trial = Point(best.common, best.per_run + np.stack(steps))
         moved = scaled_residuals(problem, trial)
-        with np.errstate(invalid="ignore"):  # a diverging prediction is kept unchanged
+        with np.errstate(invalid="ignore"):  # a run with a diverging prediction is unchanged
             saved = problem.parameters.surprises(best) - problem.parameters.surprises(trial)
             gains = [float(r @ r - m @ m) + own for r, m, own in zip(residuals, moved, saved, strict=True)]
         better = [gain > _RELEASE_GAIN * float(r @ r) for gain, r in zip(gains, residuals, strict=True)]

@@ -1,8 +1,8 @@
 """The measured path of every run, the response of the reading to a further moment along it, and bases of moments.
 
-The nominal model is linear, so a missing moment m changes the reading by the response of the linear rig to
-m(t), however large the gap, if m is evaluated along the true motion. The measured motion is close to it: the
-fitted motion plus the smoothed residual.
+The nominal model is linear. However large the gap, a missing moment m therefore changes the reading by the
+response of the linear rig to m(t), if m is evaluated along the true motion. The measured motion is close to it:
+the fitted motion plus the smoothed residual.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.quantities import Angles, Rates, Times
 from tunnel_sim.vocabulary.record import Array
 
-_WINDOW, _NARROW = 0.4, 0.2  # of a cycle; the first passes the third harmonic at half height
+_WINDOW, _NARROW = 0.4, 0.2  # share of a cycle; the first window passes the third harmonic at half height
 _LARGE = 30.0  # noise variances of a block mean: larger residuals must not be smoothed away
-_ROWS = 24  # per cycle, to which white residuals are averaged: the motion has no more than its third harmonic
+_ROWS = 24  # rows per cycle to which white residuals are averaged: the motion has at most its third harmonic
 
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """One run as the laws use it; the fit's residuals are to be explained."""
+    """One run with its fit, in the form used by the laws; they explain the residuals of the fit."""
 
     fit: Fit
     index: int
@@ -64,7 +64,7 @@ class Path:
     def fitted(self) -> Places:
         """The places of the fitted motion, free of errors of the reading.
 
-        Along the measured path an error in proportion to the angle would be the residual itself, whatever its
+        Along the measured path an error in proportion to the angle would equal the residual, whatever its
         cause: the release absorbs the rest.
         """
         angle, rate = self._fitted
@@ -81,7 +81,7 @@ class Path:
         width = 2 * round(np.pi * (_NARROW if large else _WINDOW) / (omega * run.interval)) + 1
         if width < 5 or width > residual.size // 4:
             return fitted, slope
-        from scipy.signal import savgol_filter  # only here: slow to load
+        from scipy.signal import savgol_filter  # imported here because it is slow to load
 
         smooth = savgol_filter(residual, width, 3)
         smooth_slope = savgol_filter(residual, width, 3, deriv=1, delta=run.interval)
@@ -119,7 +119,7 @@ class Path:
 
     def _filter(self, interval: float) -> tuple[Array, Array]:
         """Numerator and denominator of the reading's response to a moment that is linear between samples."""
-        from scipy.signal import cont2discrete  # only here: slow to load
+        from scipy.signal import cont2discrete  # imported here because it is slow to load
 
         numerator = np.array([1.0] + [0.0] * self.run.derivative)
         denominator = np.array(linear_coefficients(self.fit, self.index))
@@ -128,7 +128,7 @@ class Path:
 
     def response(self, moment: Array) -> Array:
         """Response of the reading, from rest, to a moment, N m, shape (n, k), as `rows`."""
-        from scipy.signal import lfilter  # only here: slow to load
+        from scipy.signal import lfilter  # imported here because it is slow to load
 
         run = self.run
         if run.plain:  # fewer values to filter
@@ -138,7 +138,7 @@ class Path:
 
     @cached_property
     def group(self) -> int:
-        """Blocks averaged into a row."""
+        """Number of blocks averaged into a row."""
         return max(1, round(2.0 * np.pi / (self.omega * self.run.interval * _ROWS)))
 
     def reading_rows(self, reading: Array) -> Array:
@@ -158,7 +158,7 @@ class Path:
 
     @cached_property
     def release(self) -> Array:
-        """Responses absorbed by the release and the run's own parameters, orthonormal, shape (rows, own)."""
+        """Responses that the release and the run's own parameters absorb, orthonormal, shape (rows, own)."""
         inertia, damping, stiffness = linear_coefficients(self.fit, self.index)
         roots = np.roots([inertia, damping, stiffness]).astype(complex)
         waves = np.exp(np.outer(self.time - self.time[0], roots))
@@ -172,14 +172,15 @@ class Path:
     def nominal(self) -> Array:
         """Responses to a step of the model's common parameters, shape (rows, common).
 
-        The moments of inertia, damping and air, which come first, are those along the measured path, so they
+        The moments of inertia, damping and air come first. They are evaluated along the measured path, so they
         apply however far the parameters move.
         """
         data, run = self.fit.problem.data, self.run
         inertia, damping, stiffness = linear_coefficients(self.fit, self.index)
         pressure = data.air_moment(run)
         lag = data.air_damping(run)
-        swing = (stiffness * self.angle + damping * self.rate) / inertia  # the angular acceleration, reversed
+        # the angular acceleration, with its sign reversed
+        swing = (stiffness * self.angle + damping * self.rate) / inertia
         moments = {
             "yaw_inertia": swing,
             "stiffness": -self.angle,
@@ -194,19 +195,19 @@ class Path:
 
 
 def paths(fit: Fit) -> list[Path]:
-    """The paths of all runs of the fit whose residuals are to be explained."""
+    """The paths of all runs of the fit."""
     return [Path(fit, index) for index in range(len(fit.problem.data.runs))]
 
 
-_FINE, _MEDIUM, _COARSE = 33, 15, 7  # splines over the range of the motion
-_SLOW = 16  # splines over the time of a run
-_PER_CYCLE = 6.0  # splines in time that follow a blow
-_SETTLED = 0.02  # of the greatest rate: below it, dry friction may be any moment
+_FINE, _MEDIUM, _COARSE = 33, 15, 7  # number of splines over the range of the motion
+_SLOW = 16  # number of splines over the time of a run
+_PER_CYCLE = 6.0  # number of splines per cycle that follow a blow
+_SETTLED = 0.02  # share of the greatest rate below which dry friction may be any moment
 
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Points at which a basis is evaluated, in place of a `Path`.
+    """Points for evaluating a basis, in place of a `Path`.
 
     Args:
         stiffness: of the spring, N m/rad.
@@ -225,10 +226,10 @@ class Ranges:
     """Ranges of the runs.
 
     Args:
-        angle: greatest, rad.
-        rate: greatest, rad/s.
-        time: latest, s.
-        cycle: of the motion, s.
+        angle: greatest angle, rad.
+        rate: greatest rate, rad/s.
+        time: latest time, s.
+        cycle: period of the motion, s.
         stiffness: median over the runs, N m/rad.
         speed: greatest wind speed, m/s; 1 where there is no wind.
     """
@@ -254,14 +255,14 @@ def ranges(runs: Sequence[Path]) -> Ranges:
 
 
 def _splines(values: Array, low: float, high: float, count: int) -> Array:
-    """Cubic B-splines on even knots, shape (n, count); values outside the range are taken at its end."""
+    """Cubic B-splines on even knots, shape (n, count); values outside the range are moved to its end."""
     inner = np.linspace(low, high, count - 2)
     knots = np.concatenate([[low] * 3, inner, [high] * 3])
     return np.asarray(BSpline.design_matrix(np.clip(values, low, high), knots, 3).toarray())
 
 
 def _times(one: Array, other: Array) -> Array:
-    """Products of each column of one set with each of the other."""
+    """Products of each column of one set with each column of the other."""
     return np.asarray((one[:, :, None] * other[:, None, :]).reshape(one.shape[0], -1))
 
 
@@ -287,7 +288,7 @@ def _of_both(at: Motion, r: Ranges) -> Array:
 
 
 def _wide(values: Array, reach: float) -> Array:
-    """Wide splines, which a law uses before narrow ones; without them the prior would favour rough laws."""
+    """Wide splines, for a law to use before narrow ones; without them the prior would favour rough laws."""
     found = [_splines(values, -reach, reach, count) * (_FINE / count) for count in (_MEDIUM, _COARSE)]
     return np.column_stack(found)
 
@@ -316,7 +317,7 @@ def state(at: Motion, r: Ranges) -> Array:
 
 
 def wind(at: Motion, r: Ranges) -> Array:
-    """Moments of angle and rate in proportion to the dynamic pressure; of the rate also to the wind speed."""
+    """Moments of angle and rate in proportion to dynamic pressure; of the rate also to the wind speed."""
     share = at.speed / r.speed
     still = [
         share * _of_angle(at, r, _FINE),
@@ -327,7 +328,7 @@ def wind(at: Motion, r: Ranges) -> Array:
 
 
 def time(at: Motion, r: Ranges) -> Array:
-    """Moments that vary in time, alike in all runs: alone, or as a stiffness, damping or friction."""
+    """Moments that vary in time, equal in all runs: alone, or as a stiffness, damping or friction."""
     slow = _splines(at.time, 0.0, r.time, _SLOW)
     fine = _splines(at.time, 0.0, r.time, max(4, round(_PER_CYCLE * r.time / r.cycle)))
     stiffness = at.angle / r.angle * np.array([[1.0], [_spring(at, r)], [(at.speed / r.speed) ** 2]])
@@ -336,7 +337,7 @@ def time(at: Motion, r: Ranges) -> Array:
 
 
 def reading(at: Motion, r: Ranges) -> Array:
-    """Errors of the reading, as shares of the greatest angle: of angle, rate and time, alike in all runs."""
+    """Errors of the reading, as shares of the greatest angle: of angle, rate and time, equal in all runs."""
     columns = [
         _of_angle(at, r, 2 * _FINE),
         _of_rate(at, r, _MEDIUM),
@@ -359,12 +360,12 @@ def between(at: Motion, r: Ranges) -> Array:
 
 
 def wander(at: Motion, r: Ranges) -> Array:
-    """A zero of the reading that wanders or jumps, different from run to run: steps, whose sum is a random walk."""
+    """A zero that wanders or jumps differently in each run: steps that add up to a random walk."""
     knots = np.linspace(at.time[0], at.time[-1], max(4, round(_PER_CYCLE * r.time / r.cycle)))[1:-1]
     return np.asarray((at.time[:, None] > knots[None, :]).astype(np.float64))
 
 
-#: Kinds whose law is common to all runs, so that it predicts a held-out run; simpler kinds first.
+#: Kinds with one law for all runs, which predicts a held-out run; simpler kinds first.
 COMMON: Mapping[str, Basis] = {
     "angle": angle, "rate": rate, "wind": wind, "state": state, "time": time, "reading": reading,
 }  # fmt: skip

@@ -21,7 +21,7 @@ from tunnel_sim.physics.moment_law import WEIGHTS
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.record import Array
 
-_BEYOND = 1e6  # rad or rad/s: at such an angle the integrator stops
+_BEYOND = 1e6  # rad or rad/s: the integrator stops at such an angle
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,13 +29,13 @@ class Problem:
     """A fit to be made: prepared runs, and the effects added to the nominal model.
 
     Args:
-        effects: effect classes whose parameters are free.
+        effects: effect classes with free parameters.
         fixed: values of fixed effect parameters, as ``effect.parameter``.
         free_forms: free form parameters, as ``effect.parameter``; the others keep the textbook form.
         instants: number of instants in every run for an effect that skips samples.
-        scatter: chance differences between runs beside the effects; each run has its own deviation of each.
-        resolve_rod_mode: whether a flexible rod is integrated with its ringing; else the ringing is added to the
-            slow motion, which is much faster and exact for a linear rig.
+        scatter: chance differences between runs beside the effects; each run deviates in each of them.
+        resolve_rod_mode: whether to integrate a flexible rod with its ringing; else the ringing is added to the
+            slow motion, which is much faster, and exact for a linear rig.
     """
 
     data: Data
@@ -83,7 +83,7 @@ class Problem:
 
         Args:
             common: as in `Point`, shape (common,).
-            own: of the run, a row of ``Point.per_run``, shape (own,).
+            own: parameters of the run, a row of ``Point.per_run``, shape (own,).
         """
         parameters = self.parameters
         if "zero" in parameters.names:
@@ -122,7 +122,7 @@ class Problem:
 
         Args:
             common: as in `Point`, shape (common,).
-            release: of the run, shape (2,).
+            release: release of the run, shape (2,).
         """
         return self.data.model.run_settings(self._values(common, release), run)
 
@@ -134,7 +134,7 @@ class Problem:
         Args:
             common: as in `Point`, shape (common,).
             own: the run's own parameters, a row of ``Point.per_run``, shape (own,).
-            effects: from `effects_at`, where they are known already.
+            effects: from `effects_at`, if already known.
         """
         drawn = self._drawn(own[None])[0]
         known = self.effects_at(common) if effects is None else effects
@@ -148,8 +148,8 @@ class Problem:
     def predict(self, points: Sequence[Point]) -> list[list[Array]]:
         """Predicted block means of the reading, for every point, for every run.
 
-        In rad; infinite where the motion diverges, a parameter is not finite, or an initial state is beyond
-        any motion.
+        In rad; infinite where the motion diverges, a parameter is not finite, or an initial state is out of
+        range.
         """
         found = [[np.full(run.reading.size, np.inf) for run in self.data.runs] for _ in points]
         places = [
@@ -166,10 +166,10 @@ class Problem:
     def asked(self, points: Sequence[Point], places: Sequence[tuple[int, int]]) -> Asked:
         """The runs to be predicted, with their physics.
 
-        They are in their original, shorter blocks where the reading is not the angle, or the rod rings.
+        The runs have their original, shorter blocks where the reading is not the angle, or the rod rings.
 
         Args:
-            places: of the points and the runs.
+            places: indices of the points and the runs.
         """
         runs = [self.data.runs[r] for _, r in places]
         common = np.stack([points[i].common for i, _ in places])

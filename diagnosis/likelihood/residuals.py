@@ -1,9 +1,9 @@
 """Spectral lines of residuals, and the misfit by channel.
 
 A damping error changes the amplitude of the motion, and a stiffness error its phase. In every cycle the
-residual is therefore split into its part along the motion, its part along the rate, its mean, and the rest; a
-part that grows linearly over a run is a damping or a frequency specific to the run. A frequency error makes
-χ² large, because phases add up: in a separate channel it does not hide a cause in the damping.
+residual is therefore split into its part along the motion, its part along the rate, its mean, and the rest. A
+part that grows linearly over a run is a damping or a frequency specific to the run. A frequency error makes χ²
+large, because phases add up; a separate channel keeps it from hiding a cause in the damping.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from diagnosis.model.run_data import RunData
 from tunnel_sim.vocabulary.quantities import Frequencies, Hertz, Seconds
 from tunnel_sim.vocabulary.record import Array
 
-_PADDING = 8  # zero padding: lines are found to a small part of a bin
+_PADDING = 8  # zero padding: lines are located to a small part of a bin
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +30,7 @@ class ResidualSpectrum:
 
     Args:
         transform: complex amplitude of a sine at that frequency, in noise standard deviations, shape (n,).
-        count: residuals in the record.
+        count: number of residuals in the record.
     """
 
     frequency: Frequencies
@@ -67,9 +67,9 @@ class SpectralLine:
 
     Args:
         parameter: frequency in Hz for the mains, Strouhal number for shedding.
-        drop: of χ² when the line is removed from the runs concerned, dimensionless.
-        contrast: ratio of the drop at the line to the drop beside it (the greatest for the mains, the median for
-            shedding).
+        drop: drop of χ² when the line is removed from the runs concerned, dimensionless.
+        contrast: ratio of the drop at the line to the drop beside it (the greatest drop for the mains, the
+            median for shedding).
         amplitude: rad at the sensor for the mains, moment coefficient for shedding.
         phases: of sine, rad, by run, shape (runs,); zero for runs not concerned.
     """
@@ -99,11 +99,12 @@ def block_gain(frequency: Hertz, run: RunData) -> float:
 
 
 def wind_line(fit: Fit, least: float, greatest: float, size: str) -> SpectralLine | None:
-    """The strongest line of a moment whose frequency is in proportion to the wind speed, in all wind-on runs.
+    """The strongest line of a moment with a frequency proportional to the wind speed, in all wind-on runs.
 
     Args:
-        least: frequency times size over wind speed, dimensionless; a Strouhal number where the size is the width.
-        greatest: upper bound of the same ratio, dimensionless.
+        least: least frequency times size over wind speed, dimensionless; a Strouhal number where the size is
+            the width.
+        greatest: upper bound on the same ratio, dimensionless.
         size: ``width`` or ``length`` of the body.
 
     Returns:
@@ -124,7 +125,7 @@ def wind_line(fit: Fit, least: float, greatest: float, size: str) -> SpectralLin
         own = resonance(fit, i)
         frequency = grid * speed / metres
         power = spectra[i].power(frequency)
-        power[np.abs(frequency / own - 1.0) < 0.08] = 0.0  # the free motion's own line is not evidence
+        power[np.abs(frequency / own - 1.0) < 0.08] = 0.0  # the line of the free motion is not evidence
         powers.append(power)
         # no run carries a line alone
         limited.append(np.minimum(power, 10.0 * float(np.quantile(power, 0.99)) + 1.0))
@@ -170,7 +171,7 @@ CHANNELS = ("damping", "frequency", "damping of runs", "frequency of runs", "zer
 """The order of the channels in all arrays."""
 
 _LEAST = 4  # samples in a cycle
-_SINGULAR = 1e-14  # relative: columns that are the same but for rounding
+_SINGULAR = 1e-14  # relative: columns that agree up to rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,8 +183,8 @@ class ChannelMisfit:
         count: expected χ² of noise alone: independent values by channel, shape (6,).
         motion: sum of squares of the readings about their means in every cycle, in noise variances,
             dimensionless.
-        scatter_cost: −2 ln of the evidence of its chance differences between runs, dimensionless; 0 where
-            they repeat.
+        scatter_cost: −2 ln of the evidence of the fit's chance differences between runs, dimensionless; 0 where
+            the runs repeat.
         deviation_precision: precision of these differences, as in `Between.cost`, shape (runs, kinds, kinds).
         repeats: whether the runs of the fit repeat exactly.
     """
@@ -228,7 +229,7 @@ def gap_left(fit: Fit) -> ChannelMisfit:
     )
 
 
-#: Cached per fit: they depend on the fit alone, and its residuals are split many times.
+#: The channels of a fit's own residuals are cached, because residuals are split many times.
 _KNOWN_CYCLES: WeakKeyDictionary[Fit, list[_Cycles]] = WeakKeyDictionary()
 
 
@@ -321,7 +322,7 @@ def _line_basis(weights: Array) -> Array:
 
 
 def _curve_and_line(values: Array, basis: Array) -> tuple[float, float]:
-    """χ² of weighted values about their straight line over the cycles, and of that line."""
+    """χ² of weighted values about their straight line over the cycles, and χ² of the line itself."""
     line = basis.T @ values
     curve = values - basis @ line
     return float(curve @ curve), float(line @ line)

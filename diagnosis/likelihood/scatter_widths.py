@@ -28,19 +28,19 @@ from identification.campaign.random_effects import (
 from tunnel_sim.vocabulary.quantities import PerKind, PerRun
 from tunnel_sim.vocabulary.record import Array
 
-#: Share of a column's power that deviations of the runs must fail to explain. Smaller differences are
-#: finite-difference errors (1e-11 at most), which would fix an undetermined parameter. True differences may
-#: be as small as 1e-8: an inertia and a stiffness differ so little where a moment is cubic.
+#: Minimum share of a column's power that deviations of the runs fail to explain. Smaller differences are
+#: finite-difference errors (1e-11 at most), which would fix an undetermined parameter. True differences may be
+#: as small as 1e-8: an inertia and a stiffness differ so little where a moment is cubic.
 _APART = 1e-9
-_NARROWER = 0.3  # factor on widths from which their maxima are sought
+_NARROWER = 0.3  # factor on widths at which the search for their maxima starts
 _USUAL = UsualWidths()
-_NULL = 1e-10  # singular value of a run's own columns, relative to the largest, that counts as zero
+_NULL = 1e-10  # maximum singular value of a run's own columns, relative to the largest, that counts as zero
 
 Kept = NDArray[np.bool_]
 
 
 def width_prior(problem: Problem) -> WidthPrior:
-    """The prior of the widths; where the campaign states them, a lower bound."""
+    """The prior of the widths; if the campaign states widths, they are a lower bound."""
     known = problem.data.repeatability
     usual = np.array([getattr(_USUAL, one.kind.scatters) for one in problem.scatter])
     given = np.array([known.get(one.kind.scatters, 0.0) for one in problem.scatter])
@@ -51,12 +51,12 @@ def width_prior(problem: Problem) -> WidthPrior:
 
 @dataclass(frozen=True, eq=False)
 class ScatterColumns:
-    """The columns of a fit with chance differences between runs, the run's other parameters projected out.
+    """The columns of a fit with chance differences between runs, each run's other parameters projected out.
 
     Args:
         bases: orthonormal columns of a run's other parameters, by run, shape (n, m).
-        deviations: by run, shape (n, kinds).
-        common: by run, shape (n, common).
+        deviations: columns of the deviations, by run, shape (n, kinds).
+        common: columns of the common parameters, by run, shape (n, common).
         residuals: scaled, without the fitted deviations, by run, shape (n,).
     """
 
@@ -72,7 +72,7 @@ class ScatterColumns:
         """The columns at a point.
 
         Args:
-            residuals: scaled, by run.
+            residuals: scaled residuals, by run.
             jacobian: as in `Fit`.
         """
         places = problem.parameters.places(problem.scatter)
@@ -90,11 +90,11 @@ class ScatterColumns:
 
     @cached_property
     def products(self) -> RunProducts:
-        """Their products."""
+        """Products of the columns."""
         return RunProducts.of(self.deviations, self.common, self.residuals)
 
     def with_column(self, change: Sequence[Array]) -> tuple[ScatterColumns, float]:
-        """Add a common column; also returns its norm, by which it is scaled.
+        """Add a common column; also returns the norm by which it is scaled.
 
         Args:
             change: of the scaled prediction, by run, shape (n,).
@@ -106,16 +106,16 @@ class ScatterColumns:
         return ScatterColumns(self.bases, self.deviations, common, self.residuals), size
 
     def remaining_residuals(self, found: Marginal) -> list[Array]:
-        """Residuals at the likeliest parameters and deviations by linear theory, by run, shape (n,)."""
+        """Residuals at the most likely parameters and deviations by linear theory, by run, shape (n,)."""
         rows = zip(self.residuals, self.common, self.deviations, found.deviations, strict=True)
         return [z - j @ found.common - d @ e for z, j, d, e in rows]
 
     def with_drift(self, place: int, along: PerRun | None = None) -> tuple[ScatterColumns, float]:
-        """Add a drift of one parameter, whose deviation is proportional to a run's place in the campaign.
+        """Add a drift: a deviation of one parameter in proportion to a run's place in the campaign.
 
         Args:
             place: of the parameter among the deviations.
-            along: another quantity in place of the run's place, from -1/2 to 1/2, shape (runs,).
+            along: another quantity that replaces the run's place, from -1/2 to 1/2, shape (runs,).
 
         Returns:
             The columns, and the norm of the column for a drift of 1 from the first run to the last.
@@ -124,9 +124,9 @@ class ScatterColumns:
         return self.with_column([t * own[:, place] for t, own in zip(order, self.deviations, strict=True)])
 
     def likeliest(self, prior: WidthPrior, start: PerKind | None = None) -> Between:
-        """The likeliest widths, and the runs with them."""
+        """The most likely widths, and the runs with them."""
         first = prior.usual if start is None else np.clip(start, prior.least, prior.most)
-        # a further parameter may act like a width: there are then several maxima
+        # a further parameter may act like a width: then there are several maxima
         narrower = (first, np.maximum(_NARROWER * first, prior.least), prior.least)
         tries = [np.array(one) for one in product(*zip(*narrower, strict=True))]
         costs = [marginal(self.products, one).restricted + prior.cost(one) for one in tries]
@@ -152,10 +152,9 @@ class Between:
     """The runs with given widths of chance differences.
 
     Args:
-        likeliest: the deviations integrated out.
-        prior_cost: −2 ln of the prior density of the widths, up to a constant, dimensionless.
-        most: the deviations integrated out with the greatest widths, so that all knowledge comes from within
-            runs.
+        likeliest: the deviations integrated out with the given widths.
+        most: the deviations integrated out with the greatest widths, so that only the evidence within runs
+            counts.
     """
 
     widths: PerKind
@@ -165,7 +164,7 @@ class Between:
 
     @property
     def likelihood(self) -> float:
-        """−2 ln of the likelihood and the prior of the widths, up to a constant."""
+        """−2 ln of the likelihood times the prior of the widths, up to a constant."""
         return self.likeliest.likelihood + self.prior_cost
 
     @property
@@ -174,7 +173,7 @@ class Between:
         return self.likeliest.restricted + self.prior_cost
 
     def shown(self, values: Array, stds: float) -> Kept:
-        """Which common parameters differ from zero by the evidence within runs alone.
+        """Whether each common parameter differs from zero by the evidence within runs alone.
 
         Args:
             values: of the common parameters, in their units, shape (common,).
@@ -188,16 +187,16 @@ class Between:
     def cost(self, deviation_precision: Array, given: Kept | None = None) -> float:
         """−2 ln of the evidence without the residuals' χ²: the cost of letting the runs differ so much.
 
-        It is 0 for runs that repeat exactly. The deviations count as if they were known as well as under one
-        model for all sets; otherwise vortices, whose phase shows the speed of a run, would pay or be paid for
-        that knowledge. Common parameters that only the comparison of runs determines are integrated out with
-        the greatest widths; otherwise an effect that aligns a few runs by chance would reduce their width to
-        zero.
+        It is 0 for runs that repeat exactly. All sets use the accuracy of the deviations under one common
+        model. Otherwise an effect such as vortices would gain or lose weight by that accuracy: their phase
+        shows the speed of a run. Common parameters that only the comparison of runs determines are integrated
+        out with the greatest widths; otherwise an effect that aligns a few runs by chance would reduce their
+        width to zero.
 
         Args:
             deviation_precision: Dᵀ D of every run under that model, shape (runs, kinds, kinds).
-            given: common parameters that are not integrated out, shape (common,): parameters of effects that the
-                runs show by themselves, which cannot align runs by chance. None: there are none.
+            given: common parameters that are not integrated out, shape (common,). They are the parameters of
+                effects that single runs show, which cannot align runs by chance. None: there are none.
         """
         identity = np.eye(self.widths.size)
         scaled = identity + self.widths[None, :, None] * deviation_precision * self.widths
@@ -227,7 +226,7 @@ def _columns(by_run: Sequence[Array]) -> list[list[Array]]:
 
 
 def _inside(deviations: Sequence[Array], column: list[Array]) -> list[Array]:
-    """A column of all runs; its projection on the deviations where the rest is a finite-difference error."""
+    """A column of all runs, or its projection on the deviations if the rest is a finite-difference error."""
     inside = []
     for chance, one in zip(deviations, column, strict=True):
         size = np.sqrt(np.sum(chance**2, axis=0)) + 1e-300

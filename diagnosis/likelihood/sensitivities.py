@@ -21,8 +21,8 @@ def sensitivities(
     """Derivatives of the scaled prediction.
 
     Args:
-        base: derivatives of a fit of the same runs with fewer parameters, which come first; they are reused.
-        prediction: at the point, by run, where it is known.
+        base: derivatives from a fit of the same runs with fewer parameters, which come first; they are reused.
+        prediction: prediction at the point, by run, if known.
     """
     known, known_own = (0, 0) if base is None else (base[0][0].shape[1], base[0][1].shape[1])
     points, steps = moves(problem, point, known, known_own)
@@ -55,11 +55,11 @@ def sensitivities(
 
 
 def moves(problem: Problem, point: Point, known: int = 0, known_own: int = 0) -> tuple[list[Point], Array]:
-    """Points a small step away, one for each parameter: the common ones first, then every run's own.
+    """Points one small step away for each parameter: first the common ones, then every run's own.
 
     Args:
-        known: the first so many common parameters are left out.
-        known_own: the first so many of every run's own parameters are left out.
+        known: number of leading common parameters to leave out.
+        known_own: number of leading own parameters of every run to leave out.
 
     Returns:
         The points, and their steps by run, in the parameters' units, shape (points, runs).

@@ -1,7 +1,7 @@
 """Changes of predicted readings to first order, from the derivatives that the compiled integrator carries.
 
-The integrator gives the derivatives of a motion by the terms of its law. The effect of a parameter on these terms,
-and on the reading of a motion, is cheap to compute: there a small step of the parameter serves.
+The integrator gives the derivatives of a motion by the terms of its law. How a parameter changes these terms,
+and the reading of a motion, is cheap to compute by a small step of the parameter.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from tunnel_sim.physics.rod_modes import Ringing
 from tunnel_sim.physics.slopes import most_changes, slopes, terms
 from tunnel_sim.vocabulary.record import Array
 
-#: The fields of a run that say at which times it has samples.
+#: The fields of a run that state the times of its samples.
 _OF_TIMES = (
     "wind_count",
     "wind_interval",
@@ -27,25 +27,25 @@ _OF_TIMES = (
     "moment_delay",
     "moment_on_end",
 )
-_TOGETHER = 8  # motions in a part of the work: as many as the integrator takes side by side
+_TOGETHER = 8  # motions in a part of the work: as many as the integrator runs side by side
 
 
 def changes(asked: Asked, count: int) -> list[Array]:
-    """Changes of block means from a first point to others near it, to first order in what changes the motion.
+    """Changes of block means from a first point to others near it, to first order in the changes of the motion.
 
     Args:
         asked: the runs at the first point, and the same runs at each other point.
         count: number of runs.
 
     Returns:
-        By run, in the unit of the reading, shape (points, blocks); NaN throughout at a point where the motion has
-        no derivative, its rod is followed, or it is read at times of its own.
+        By run, in the unit of the reading, shape (points, blocks). NaN throughout at a point where the motion
+        has no derivative, the ringing of its rod is resolved, or it is read at times of its own.
     """
     points = len(asked.runs) // count - 1
     unknown = [np.full((points, run.reading.size), np.nan) for run in asked.runs[:count]]
     kinds = {type(effect) for effects in asked.effects for effect in effects}
     skip = any(issubclass(kind, Clock) for kind in kinds)
-    if skip or any(asked.physics.program[:count]):  # a moment by expression has none
+    if skip or any(asked.physics.program[:count]):  # a moment stated by an expression has no derivative
         return unknown
     motions = CompiledRuns.of(asked, like=count)
     if motions.rows["twist_stiffness"].any():
@@ -66,13 +66,13 @@ def changes(asked: Asked, count: int) -> list[Array]:
 
 
 def _samples(motions: CompiledRuns, place: int, count: int) -> Array:
-    """Changes of the samples of a run's wind or drive, as in `slopes`, shape (points, samples): none without any.
+    """Changes of the samples of a run's wind or drive, as in `slopes`, shape (points, samples); maybe none.
 
-    NaN at a point where the samples are at other times than at the first.
+    NaN at a point where the sample times differ from the first point's.
     """
     rows, kept = motions.rows[place::count], motions.kept[place::count]
     of_wind, of_drive = rows["wind_count"][0] > 1.0, rows["moment_count"][0] > 0.0
-    arrays = 1 if of_wind else 2 if of_drive else 0  # of a drive, the values and their slopes
+    arrays = 1 if of_wind else 2 if of_drive else 0  # for a drive, the values and their slopes
     size = sum(array.size for array in kept[0][:arrays])
     found = np.zeros((len(rows) - 1, max(size, 1)))
     for change, row, there in zip(found, rows[1:], kept[1:], strict=True):
@@ -89,13 +89,13 @@ def _part(
     """The changes of runs that are integrated side by side, shape (points, blocks) each.
 
     Args:
-        part: their places.
-        moved: changes of their terms, shape (runs, points, terms).
-        sampled: changes of their samples, by run, as `_samples` returns them.
+        part: places of the runs.
+        moved: changes of the runs' terms, shape (runs, points, terms).
+        sampled: changes of the runs' samples, by run, as `_samples` returns them.
     """
     count, points = len(asked.runs) // (moved.shape[1] + 1), moved.shape[1]
     columns = np.flatnonzero(moved.any(axis=(0, 1)))
-    resampled = np.array([change.any(axis=1) for change in sampled])  # a change that is NaN is one, too
+    resampled = np.array([change.any(axis=1) for change in sampled])  # a change to NaN is a change, too
     along = np.flatnonzero(resampled.any(axis=0))[: most_changes()]
     runs, blocks = [asked.runs[place] for place in part], motions.blocks[part]
     effects = asked.effects[part[0]]
@@ -148,9 +148,9 @@ def _read(asked: Asked, places: Sequence[int], mean: Array, moved: Array) -> Arr
     """The changes of a run's reading, shape (points, blocks).
 
     Args:
-        places: of the run at the first point and at the others.
-        mean: of the angle, by block, at the first point, rad, shape (blocks,).
-        moved: changes of it, rad, shape (points, blocks).
+        places: indices of the run at the first point and at the others.
+        mean: mean angle by block at the first point, rad, shape (blocks,).
+        moved: changes of the mean, rad, shape (points, blocks).
     """
     run = asked.runs[places[0]]
     angles = np.concatenate([mean[None], mean + moved])

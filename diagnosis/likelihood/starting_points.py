@@ -25,12 +25,12 @@ from tunnel_sim.effects.parameters import Circumstances, ParameterInfo, Trial
 from tunnel_sim.vocabulary.record import Array
 
 GROSS_MISFIT: Final = 0.01
-"""Minimum residual, as a share of the power of the readings, at which a fit fails to describe the motion.
+"""Minimum residual, as a share of the power of the readings, for a fit to fail to describe the motion.
 Judgement."""
 
 _HELD = 1e18  # precision of fixed deviations
-_MODERATE, _SMALL = 3.0, 0.05  # sizes of a change, over the residual's size
-_ABSORBED = 2  # steps; after one, the error of the absorption is as large as what remains of the effect
+_MODERATE, _SMALL = 3.0, 0.05  # tried sizes of a change, over the residual's size
+_ABSORBED = 2  # steps; after one step, the error of the absorption is as large as the remainder of the effect
 _NEARER = 0.02  # share of an effect's size by linear theory
 
 
@@ -40,7 +40,7 @@ def nominal_start(data: Data) -> Point:
 
 
 def nominal_starts(data: Data) -> Iterator[Point]:
-    """The starting points of the nominal model; the second for a fit that misses the motion from the first."""
+    """The starting points of the nominal model; the second is for a fit that misses the motion at first."""
     parameters = Problem(data).parameters
     for start in data.model.starts(data):
         yield parameters.point(start.common, start.own)
@@ -52,10 +52,10 @@ class StartingPoint:
 
     Args:
         problem: the fit with the effect added.
-        point: where to start.
-        predicted_drop: of χ² by linear theory, dimensionless.
+        point: the starting point.
+        predicted_drop: drop of χ² by linear theory, dimensionless.
         predicted: χ² beyond noise by channel that linear theory predicts, shape (6,), dimensionless.
-        scaled: index of the common parameter scaled by linear theory; None: there is none.
+        scaled: index of the common parameter scaled by linear theory; None: no parameter is scaled.
         second_order: whether the other parameters absorb the first order of the effect.
         scatter_cost: −2 ln of the evidence of chance differences between the runs by linear theory, dimensionless.
     """
@@ -69,9 +69,9 @@ class StartingPoint:
     scatter_cost: float = 0.0
 
     def nearer(self) -> StartingPoint | None:
-        """The point with much less of the effect; None where linear theory did not scale it.
+        """The point with much less of the effect; None where linear theory did not scale the effect.
 
-        A fit from there cannot end worse than the fit without the effect.
+        A fit from this point cannot end worse than the fit without the effect.
         """
         if self.scaled is None:
             return None
@@ -96,7 +96,7 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
 
 
 def _with_own_numbers(base: Fit, kind: type[OwnNumbers], one: Sought) -> StartingPoint | None:
-    """An effect with a phase or instants in every run, as found in the residuals; None where its size is zero."""
+    """An effect with a phase or instants in every run, as found in the residuals; None if its size is zero."""
     of_input = tuple((f"{kind.name}.{i.name}", one.of_input) for i in kind.parameters() if i.of_input)
     fixed = (*base.problem.fixed, *(of_input if base.problem.data.driven else ()))
     instants = one.numbers.shape[-1] if issubclass(kind, Clock) else base.problem.instants
@@ -120,10 +120,10 @@ class _TrialChange:
 
     Args:
         problem: the fit with the effect added.
-        own: its free parameters, with the values ``sizes``, shape (own,).
-        scaled: index of the scaled one among them; None: there is none.
-        replaced: index of the common parameter that the effect replaces; None: there is none.
-        change: of the scaled prediction, by run, shape (n,).
+        own: free parameters of the effect, with the values ``sizes``, shape (own,).
+        scaled: index of the scaled parameter among them; None: no parameter is scaled.
+        replaced: index of the common parameter that the effect replaces; None: it replaces none.
+        change: change of the scaled prediction, by run, shape (n,).
     """
 
     problem: Problem
@@ -207,14 +207,14 @@ def _by_linear_theory(base: Fit, kind: type[Effect], trial: Trial) -> StartingPo
 
 @dataclass(frozen=True, eq=False)
 class _Added:
-    """A change of the prediction added by linear theory at its best size.
+    """A change of the prediction, added at its best size by linear theory.
 
     Args:
         slope: the best size, as a multiple of the change.
-        drop: of −2 ln L, dimensionless.
-        residuals: scaled, by run.
-        scatter: chance differences between the runs, with their likeliest widths beside the change.
-        scatter_cost: −2 ln of their evidence, dimensionless.
+        drop: drop of −2 ln L, dimensionless.
+        residuals: scaled residuals, by run.
+        scatter: chance differences between the runs, with the most likely widths beside the change.
+        scatter_cost: −2 ln of the evidence of these differences, dimensionless.
     """
 
     slope: float
@@ -238,7 +238,7 @@ def _added(base: Fit, change: list[Array]) -> _Added | None:
 
 
 def _added_beside_scatter(base: Fit, between: Between, change: list[Array]) -> _Added | None:
-    """A change added to a fit whose runs differ by chance: with a further cause, they may differ less."""
+    """A change added to a fit with scatter between its runs: a further cause may reduce the scatter."""
     if not all(np.all(np.isfinite(one)) for one in change):
         return None
     columns, size = base.columns.with_column(change)
@@ -264,7 +264,7 @@ def _tried(base: Fit, kind: type[Effect], trial: Trial) -> Problem:
 
 
 def second_order_starts(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
-    """Starts of an effect whose first order is absorbed, at the sizes of its passive trials, whatever the readings.
+    """Starts of an effect with an absorbed first order, at the sizes of its passive trials, whatever the readings.
 
     Empty for other effects, and where the runs cannot show it.
     """
@@ -285,8 +285,8 @@ def second_order_starts(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
 def misses_motion(fit: Fit) -> bool:
     """Whether a fit misses the motion itself, so that its sensitivities are of little use.
 
-    It does where the residual exceeds a given share of the power of the readings, both about their means in
-    every cycle. A drift or a step of the zero is slower than the motion and does not affect its phase.
+    It does if the residual exceeds a given share of the power of the readings, both about their means in every
+    cycle. A drift or a step of the zero is slower than the motion and does not affect its phase.
     """
     found = misfit(fit)
     at_motion = float(found.chi2.sum()) - float(found.chi2[CHANNELS.index("zero")])
@@ -317,7 +317,7 @@ def _circumstances(base: Fit) -> Circumstances:
 
 
 def _with_effect(base: Fit, values: Array, scaled: int | None, replaced: int | None) -> Array:
-    """Common parameters with an effect's parameters; ``replaced`` is the index of the one that it replaces."""
+    """Common parameters with an effect's parameters; ``replaced`` is the index of the parameter it replaces."""
     common = base.point.common.copy()
     if scaled is not None and replaced is not None:
         common[replaced] -= values[scaled]
@@ -328,11 +328,11 @@ def absorbed(base: Fit, change: Sequence[Array], point: Point | None = None) -> 
     """The point at which a fit's parameters absorb a change of the scaled prediction, by one Gauss–Newton step.
 
     Args:
-        change: at the point.
-        point: where the step starts; None: at the fit's.
+        change: change of the scaled prediction at the point.
+        point: start of the step; None: the fit's point.
     """
     products = base.products
-    if base.problem.scatter:  # chance differences may contribute to the absorbed change
+    if base.problem.scatter:  # chance differences may absorb a part of the change
         precision = base.problem.parameters.precision
         products = Products.of(base.jacobian, np.where(precision > 0.0, _HELD, 0.0))
     return damped_step(
@@ -355,12 +355,12 @@ def _moderate_change(
     *,
     second_order: bool = False,
 ) -> list[Array] | None:
-    """Change of the scaled prediction by an effect, one value lowered until the change is moderate.
+    """Change of the scaled prediction by an effect, one of its values lowered until the change is moderate.
 
-    ``values`` has the effect's parameters and is changed in place to the used values; ``scaled`` is the index of
-    the one to lower, None for none; ``replaced`` is the common parameter that it replaces. Where the
-    runs differ by chance the change is small: the square of a phase error is an amplitude error, which would
-    separate an effect from such differences. An effect of ``second_order`` shows by that square alone.
+    ``values`` has the effect's parameters and is changed in place to the used values; ``scaled`` is the index
+    of the value to lower, None for none; ``replaced`` is the common parameter that the effect replaces. If the
+    runs differ by chance, the change is small: the square of a phase error is an amplitude error, which would
+    distinguish an effect from such differences. An effect of ``second_order`` shows only by that square.
     """
     limit = (_SMALL if base.problem.scatter and not second_order else _MODERATE) * np.sqrt(base.total)
     for _ in range(12):
@@ -380,7 +380,7 @@ def unabsorbed(base: Fit, kind: type[Effect]) -> tuple[Array, float] | None:
     """The change by an effect of typical size that the fitted parameters cannot absorb.
 
     Args:
-        kind: an effect without numbers of its own in every run.
+        kind: an effect without parameters per run.
 
     Returns:
         The scaled change of all runs, shape (n,), and its norm as a share of the whole change; None where the
@@ -407,7 +407,7 @@ def unabsorbed(base: Fit, kind: type[Effect]) -> tuple[Array, float] | None:
 
 
 def project_out(base: Fit, columns: list[Array]) -> list[Array]:
-    """The part of a change of the prediction, by run, that the fitted common parameters and releases cannot absorb.
+    """The part of a change of the prediction, by run, that common parameters and releases of the fit cannot absorb.
 
     Args:
         columns: scaled change by run, each of shape (n,).

@@ -11,8 +11,8 @@ from diagnosis.likelihood.normal_equations import by_run
 from diagnosis.model.parameters import Point
 from tunnel_sim.vocabulary.record import Array
 
-_UNDETERMINED = 1e-9  # share of its information on a parameter that the other runs must have
-_ITERATIONS = 10  # of a fit without a run: it starts near
+_UNDETERMINED = 1e-9  # minimum share of its information on a parameter that the other runs must have
+_ITERATIONS = 10  # iterations of a fit without a run: it starts nearby
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,10 +22,10 @@ class WithoutRuns:
     Args:
         fitted: the fit to all runs.
         common: common parameters without each run, shape (runs, common).
-        stds: their standard deviations, the misfit of the other runs as noise, shape (runs, common); infinite
-            where the other runs do not determine them.
+        stds: standard deviations of the common parameters, with the misfit of the other runs as noise, shape
+            (runs, common); infinite where the other runs do not determine them.
         total: χ² of the other runs, with the priors of their own parameters, shape (runs,).
-        count: number of their residuals, shape (runs,).
+        count: number of residuals of the other runs, shape (runs,).
     """
 
     fitted: Fit
@@ -65,10 +65,10 @@ class WithoutRuns:
 
 
 def refitted_without(fitted: Fit, index: int) -> Fit | None:
-    """The fit of a problem to all runs but one, with the noise and the widths as they are; None where it fails.
+    """The fit of a problem to all runs but one, with unchanged noise and widths; None where it fails.
 
     Args:
-        index: of the run that is left out.
+        index: index of the left-out run.
     """
     data = fitted.problem.data
     others = data.with_runs(tuple(run for place, run in enumerate(data.runs) if place != index))

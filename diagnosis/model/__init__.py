@@ -1,1 +1,1 @@
-"""Runs as the fits see them, and one nominal model for each kind of rig."""
+"""The runs as the fits see them, and one nominal model for each kind of rig."""

@@ -1,4 +1,4 @@
-"""Prepare a campaign for the fits: in blocks, and without what no free decay explains."""
+"""Prepare a campaign for the fits: in blocks, and without the parts that no free decay explains."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ LONG_REST: Final = 0.1
 """Minimum duration of a rest at the end of a run, as a share of the run, for it to be cut off. Judgement. The
 angle at which friction stops a body says little about its motion."""
 REST_STDS: Final = 5.0
-"""Maximum deviation from the final reading at which the body counts as at rest, in std of a block mean.
+"""Maximum deviation from the final reading for the body to count as at rest, in std of a block mean.
 Convention."""
 
 #: Interval of the block means, s: the motion stays below 10 Hz and the mains at 50 Hz.
 BLOCK_INTERVAL = 4e-3
-_END = 50  # a run ends where its last fiftieth stands
-_STILL = 0.02  # of the largest swing, within which a body counts as at rest
+_END = 50  # the last fiftieth of a run gives the reading of its rest
+_STILL = 0.02  # share of the largest swing within which a body counts as at rest
 
 
 def prepare(
@@ -41,14 +41,14 @@ def prepare(
     """Average a campaign's records in blocks.
 
     Args:
-        noise_variance: of one sample, rad², by run id.
+        noise_variance: noise variance of one sample, rad², by run id.
         similarity: how the campaign was made from the measured one.
-        interval: between the blocks, s; the nearest number of samples, at least one.
+        interval: interval between the blocks, s; the nearest number of samples, at least one.
         model: nominal model of the campaign; None: the model of its kind.
-        settings: of the diagnosis.
+        settings: settings of the diagnosis.
 
     Returns:
-        The prepared data. Where a wind-on run states no air density, all have the density 1 kg/m³.
+        The prepared data. If a wind-on run states no air density, all runs have the density 1 kg/m³.
     """
     rig = campaign.rig
     model = model or nominal_model(campaign)
@@ -95,7 +95,7 @@ def _driven(data: RunData, run: Run, model: NominalModel) -> RunData:
     """A driven run with its input."""
     assert run.drive is not None
     record = run.record
-    begun = 0.0 if record.uniform else 0.5 * record.sample_interval  # as the raster of the blocks does
+    begun = 0.0 if record.uniform else 0.5 * record.sample_interval  # like the raster of the blocks
     scale = run.drive.kind.scale * (1.0 if run.drive.gain is None else run.drive.gain)
     moment = InputMoment.of(run.drive, record.time_s - record.time_s[0] + begun, scale, -model.lead)
     return dataclasses.replace(data, drive=moment, multiplied_by=model.multiplied_by(run.drive))
@@ -104,7 +104,7 @@ def _driven(data: RunData, run: Run, model: NominalModel) -> RunData:
 def without_start(data: Data) -> Data:
     """The runs from their second passage through the middle on.
 
-    Where a hand lets go late, the start of the record is driven, which no free decay explains.
+    If a hand lets go late, it drives the start of the record, which no free decay explains.
 
     Returns:
         The data with every run cut at the first passage through its mean after its first turning point; a run
@@ -124,17 +124,18 @@ def without_start(data: Data) -> Data:
 def without_rest(data: Data) -> Data:
     """The runs up to their last reading that differs from their end by more than a fiftieth of their largest swing.
 
-    Where dry friction stops a body depends on its last swing discontinuously, so that χ² has many minima.
+    The place at which dry friction stops a body depends discontinuously on its last swing, so χ² has many
+    minima.
     """
     return dataclasses.replace(data, runs=tuple(run.part(last=_moves_until(run)) for run in data.runs))
 
 
 def without_long_rest(data: Data) -> tuple[Data, tuple[str, ...]]:
-    """The runs up to where their motion ends, where a long rest follows.
+    """The runs up to the end of their motion, if a long rest follows.
 
     Returns:
-        The data with such runs cut after their last reading that differs from their end by more than the noise, and
-        the ids of these runs.
+        The data with each such run cut after its last reading that differs from its end by more than the noise,
+        and the ids of these runs.
     """
     ends = [_moves_until(run, REST_STDS * run.noise.scale) for run in data.runs]
     rests = [end < (1.0 - LONG_REST) * run.reading.size for run, end in zip(data.runs, ends, strict=True)]
@@ -144,9 +145,9 @@ def without_long_rest(data: Data) -> tuple[Data, tuple[str, ...]]:
 
 
 def _moves_until(run: RunData, still: float | None = None) -> int:
-    """Number of blocks up to the last that is away from the end by more than ``still``, rad; all where none is.
+    """Number of blocks up to the last that differs from the end by more than ``still``, rad; all if none does.
 
-    Without it, by more than a fiftieth of the largest swing.
+    Without ``still``, by more than a fiftieth of the largest swing.
     """
     at_end = np.median(run.reading[-max(1, run.reading.size // _END) :])
     away = np.abs(run.reading - at_end)

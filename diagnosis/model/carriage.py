@@ -21,9 +21,9 @@ class Carriage(SpringModel):
 
     @classmethod
     def describes(cls, campaign: Campaign) -> bool:
-        """Where the air does not act on the freedom, and every run states its spring."""
+        """Whether the air does not act on the freedom, and every run states its spring."""
         return not campaign.sensor.freedom.windy and super().describes(campaign)
 
     def coefficient_names(self, names: Sequence[str]) -> tuple[str, ...]:
-        """Mass and damping, as far as they are fitted."""
+        """Mass and damping, if they are fitted."""
         return tuple(name for name in self.coefficient_units if name in names)

@@ -1,4 +1,4 @@
-"""Chance differences between runs, as a fit has them: the change of a run's motion by its own deviation."""
+"""Chance differences between runs in a fit: how a run's own deviation changes its motion."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from tunnel_sim.physics.run_settings import SettingsTable
 from tunnel_sim.vocabulary.plan import AeroDerivatives
 from tunnel_sim.vocabulary.record import Array
 
-_WIDE = 10.0  # widths of a usual scatter that steps of differences are a share of
-#: Share of the air's damping that deviations of the damping are relative to at least: a bearing may have none.
+_WIDE = 10.0  # size for steps of finite differences, in widths of a usual scatter
+#: Least share of the air's damping to which deviations of the damping are relative: a bearing may have none.
 _LEAST_DAMPING = 0.1
 
 
@@ -26,17 +26,18 @@ _LEAST_DAMPING = 0.1
 class Chance:
     """One chance difference between runs: of the wind speed, the spring or the damping.
 
-    A deviation changes the linear stiffness and damping of its run, by what the nominal model gives them. An effect
-    that depends on the speed or the spring does not see it: a deviation is to follow no error of its form. The
-    exception is vortex shedding. It keeps time with the true speed; at the stated speed its phase is lost within
-    some cycles.
+    A deviation changes the linear stiffness and damping of its run, relative to the nominal model's values.
+    Effects that depend on the speed or the spring ignore it, so that a deviation does not follow an error of
+    their form. The exception is vortex shedding, which follows the true speed; at the stated speed its phase
+    would be lost within some cycles.
 
     Args:
-        kind: the effect of the vocabulary that it is.
+        kind: the effect of the vocabulary that the difference is.
         width: standard deviation of the runs' relative deviations, dimensionless.
-        derivatives: of the nominal model.
+        derivatives: aerodynamic derivatives of the nominal model.
         damping: mechanical damping of the nominal model, N m s/rad.
-        shown: whether the runs show that they differ in this rather than in the others, beyond what is stated.
+        shown: whether the runs show that they differ in this quantity rather than in the others, beyond the
+            stated scatter.
     """
 
     kind: type[BetweenRuns]
@@ -63,7 +64,7 @@ class Chance:
         )
 
     def as_wide_as(self, width: float) -> Chance:
-        """These differences with another width."""
+        """The same differences with another width."""
         return replace(self, width=float(width))
 
     def change(self, stated: SettingsTable, data: Data) -> Array:
@@ -115,7 +116,7 @@ def departure(scatter: Sequence[Chance], deviations: Array, stated: SettingsTabl
     """The changes by the deviations of runs.
 
     Args:
-        deviations: relative, by run one for each chance difference, shape (runs, differences).
+        deviations: relative deviations, by run one for each chance difference, shape (runs, differences).
         stated: the nominal physics of the runs.
 
     Returns:

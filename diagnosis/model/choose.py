@@ -9,11 +9,11 @@ from diagnosis.model.rig import PerInertia, SpringModel
 from diagnosis.model.servo import Servo, ServoPerInertia
 from tunnel_sim.vocabulary.campaign import Campaign
 
-#: In the order in which they are asked whether a campaign is theirs.
+#: In the order in which each kind is asked whether it describes a campaign.
 KINDS: tuple[type[NominalModel], ...] = (ServoPerInertia, Servo, LooseBody, PerInertia, Carriage, SpringModel)
 
 
 def nominal_model(campaign: Campaign, given: NominalModel | None = None) -> NominalModel:
-    """The nominal model of a campaign: the one given, or the kind that describes its runs."""
+    """The nominal model of a campaign: the given one, or the kind that describes its runs."""
     kind = given or next(kind for kind in KINDS if kind.describes(campaign))()
     return kind.of(campaign)

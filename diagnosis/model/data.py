@@ -18,7 +18,7 @@ from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.campaign import speed_groups
 from tunnel_sim.vocabulary.freedom import ANGLE, Freedom
 
-FOLDS = 3  # groups of runs left out in turn
+FOLDS = 3  # number of groups of runs that are left out in turn
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,9 +28,10 @@ class Data(PreparedRuns):
     Args:
         model: nominal model of the campaign; a part of its runs has the same parameters.
         similarity: how the campaign was made from the measured one.
-        settings: of the diagnosis.
-        freedom: of the body.
-        repeatability: stated relative standard deviations between runs, by what scatters; empty: none is stated.
+        settings: settings of the diagnosis.
+        freedom: freedom of the body.
+        repeatability: stated relative standard deviations between runs, by scattering quantity; empty: none is
+            stated.
     """
 
     model: NominalModel
@@ -80,12 +81,12 @@ def folds(data: Data, count: int = FOLDS) -> list[tuple[str, ...]]:
     """Groups of runs to leave out in turn.
 
     Args:
-        count: number of groups, fewer where there are few runs.
+        count: number of groups, fewer if there are few runs.
 
     Returns:
-        Ids by group. Runs with the same wind and spring go to different groups, and the runs kept always include
-        every spring, wind-off runs, wind-on runs and an input of unknown gain: the others could not be predicted
-        without them. The only run of its kind is in no group.
+        Ids by group. Runs with the same wind and spring go to different groups. The remaining runs always
+        include every spring, wind-off runs, wind-on runs and an input of unknown gain, since the others could
+        not be predicted without them. The only run of its kind is in no group.
     """
     setting = speed_groups(run.wind_speed for run in data.runs)
     order = sorted(

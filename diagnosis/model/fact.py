@@ -12,10 +12,11 @@ from tunnel_sim.files.writing import as_json
 
 @dataclass(frozen=True)
 class Fact:
-    """One finding, whose sentence is in `diagnosis.findings` under its kind.
+    """One finding; its sentence is in `diagnosis.findings`, under its kind.
 
     Args:
-        figures: the quantities in the sentence, by name, in JSON's types; numbers have their units in their names.
+        figures: the quantities in the sentence, by name, in JSON's types; the names of numbers contain their
+            units.
     """
 
     kind: str

@@ -1,4 +1,4 @@
-"""The joint of a model of one's own: its law and its actuator take the place of spring, damper and input gain."""
+"""The joint of the user's own model: its law and its actuator replace spring, damper and input gain."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from tunnel_sim.vocabulary.rig import Actuator, JointLaw
 if TYPE_CHECKING:
     from tunnel_sim.engine.joint_model import Recorded
 
-_SAME_GAIN = 1e-3  # relative: within it a stated gain, or a limit, is the model's
+_SAME_GAIN = 1e-3  # relative tolerance within which a stated gain, or a limit, is the model's
 _FEW = 5  # number of blocks that give the initial rate of a run
 _OF_SERVO = "These effects of a spring are not tried, because the actuator is a servo: {}."
 _OF_GEAR = (
@@ -45,7 +45,7 @@ class _OfLaw(NominalModel):
     """The common part of all joints with a law.
 
     Args:
-        law: of the similar campaign, as all values.
+        law: law of the joint in the similar campaign, like all values.
     """
 
     law: JointLaw = field(kw_only=True)
@@ -79,28 +79,28 @@ class _OfLaw(NominalModel):
         return replace(self, law=similar)
 
     def inertial(self, data: PreparedRuns) -> tuple[Parameter, ...]:
-        """The parameters of a rig, and a stiffness beside the law's stiffness."""
+        """The inertial parameters of a rig, and a stiffness beside the law's stiffness."""
         return *super().inertial(data), Parameter("added_stiffness", "N m/rad")
 
     @property
     def law_parameters(self) -> Mapping[str, float]:
-        """Its dry friction, and gravity as a load of it: gravity's moment itself is in the spring and the terms."""
+        """The law's dry friction, with gravity as its load; gravity's moment is in the spring and the terms."""
         stiffness, angle = self.law.weight
         hung = {"load_stiffness": stiffness, "load_angle": angle} if stiffness else {}
         return {"friction_moment": self.law.friction, **hung}
 
     @property
     def moment(self) -> str:
-        """The terms of its law, of the displacement from its rest."""
+        """The terms of the law, of the displacement from its rest."""
         return "".join(f"-({term.coefficient!r})*({term.expression})" for term in self.law.terms)
 
     @property
     def lead(self) -> float:
-        """By which its motion leads its input, s."""
+        """Time by which the joint's motion leads its input, s."""
         return self.law.lead
 
     def untried(self, campaign: Campaign, kinds: Sequence[type[Effect]]) -> dict[str, list[type[Effect]]]:
-        """Effects of a spring that is the servo of an actuator, and play where gravity takes a spring's place."""
+        """Effects of a spring, if it is the servo of an actuator, and play, if gravity replaces a spring."""
         actuator, gone = self.law.actuator, dict[str, list[type[Effect]]]()
         if actuator is not None and actuator.servo[1] != 0.0:
             gone[OF_GEAR] = [kind for kind in kinds if issubclass(kind, Backlash)]
@@ -111,7 +111,7 @@ class _OfLaw(NominalModel):
         return gone | super().untried(campaign, left)
 
     def refuse(self, campaign: Campaign) -> None:
-        """Refuse driven runs of rates, and free ones of a joint that nothing holds.
+        """Refuse driven runs of rates, and free runs of a joint without a restoring moment.
 
         Raises:
             TunnelError: for the first such run.
@@ -133,7 +133,7 @@ class _OfLaw(NominalModel):
         super().refuse(campaign)
 
     def possible_leads(self) -> tuple[float, ...]:
-        """None, a quarter and half of the model's step, s; none where it has none."""
+        """Zero, a quarter and half of the model's step, s; empty if the model has no step."""
         return tuple(0.5 * self.law.step * share for share in (0.0, 0.5, 1.0)) if self.law.step else ()
 
     def with_lead(self, lead: float) -> NominalModel:
@@ -159,20 +159,20 @@ class _OfLaw(NominalModel):
         )
 
     def spring(self, values: Mapping[str, float], run: RunData) -> float:
-        """The slope of the law, and what is added to it."""
+        """The slope of the law, plus the fitted stiffness."""
         return super().spring(values, run) + values.get("added_stiffness", 0.0)
 
 
 @dataclass(frozen=True)
 class Joint(_OfLaw, SpringModel):
-    """A joint that its law restores."""
+    """A joint with a restoring moment in its law."""
 
     coefficient_units: ClassVar[Mapping[str, str]] = {
         **LooseBody.coefficient_units, **SpringModel.coefficient_units,
     }  # fmt: skip
 
     def starts(self, data: PreparedRuns) -> Iterator[FitStart]:
-        """For driven runs, which may lack a resonance, the response to known moments first; then as for a rig."""
+        """For driven runs, which may lack a resonance, first by the response to a moment; then as for a rig."""
         if data.driven and not self.own_zeros:
             yield self._driven_start(data)
             yield self._start(data, Shown.of(data))
@@ -180,7 +180,7 @@ class Joint(_OfLaw, SpringModel):
             yield from super().starts(data)
 
     def _driven_start(self, data: PreparedRuns) -> FitStart:
-        """The readings count as positions of the joint."""
+        """Start for driven runs; the readings count as positions of the joint."""
         law = self.law
         found = filter(None, map(ShownResponse.of, data.runs))
         shown = [(one.inertia, one.rate) for one in found if one.scale * one.gain > 0.0]
@@ -196,7 +196,7 @@ class Joint(_OfLaw, SpringModel):
         return FitStart({"yaw_inertia": inertia, "mechanical_damping": damping, "zero": law.rest}, own)
 
     def tells(self, info: ParameterInfo, swing: float) -> bool:
-        """Where gravity alone restores the joint, its rest is one with the sensor's zero."""
+        """If gravity alone restores the joint, its rest is inseparable from the sensor's zero."""
         del swing
         return not (info.beside_spring and self.law.hangs and "zero" not in self.held)
 
@@ -219,11 +219,11 @@ class Joint(_OfLaw, SpringModel):
 
 @dataclass(frozen=True)
 class ServoJoint(Joint):
-    """A joint whose position servo has a kp that is fitted: it acts with the angle and with the command.
+    """A joint with a position servo of fitted kp, which acts with the angle and with the command.
 
     Args:
-        kp: of the model, N m/rad.
-        held_at: position of the joint at its rest, rad, where its servo has a moment of its own against gravity.
+        kp: kp of the model, N m/rad.
+        held_at: position of the joint at its rest, rad, if the servo carries a moment against gravity.
     """
 
     kp: float = field(kw_only=True)
@@ -236,11 +236,11 @@ class ServoJoint(Joint):
         return replace(super().similar(change), kp=change.similar(self.kp, "N m/rad"))  # type: ignore[call-arg]
 
     def inertial(self, data: PreparedRuns) -> tuple[Parameter, ...]:
-        """The joint's, and the kp."""
+        """The joint's parameters, and the kp."""
         return *super().inertial(data), Parameter("servo_kp", "N m/rad", lower=0.0, size=self.kp)
 
     def spring(self, values: Mapping[str, float], run: RunData) -> float:
-        """With the kp in place of the model's, N m/rad."""
+        """Stiffness of the spring with the fitted kp instead of the model's, N m/rad."""
         return super().spring(values, run) + values["servo_kp"] - self.kp
 
     def settings(self, values: Mapping[str, Array], runs: Sequence[RunData]) -> SettingsTable:
@@ -254,18 +254,18 @@ class ServoJoint(Joint):
         return table
 
     def starts(self, data: PreparedRuns) -> Iterator[FitStart]:
-        """From the kp of the model."""
+        """Starts at the model's kp."""
         for start in super().starts(data):
             yield replace(start, common={**start.common, "servo_kp": self.kp})
 
     def coefficient_names(self, names: Sequence[str]) -> tuple[str, ...]:
-        """The kp first."""
+        """The coefficients, the kp first."""
         return "servo_kp", *super().coefficient_names(names)
 
 
 @dataclass(frozen=True)
 class LooseJoint(_OfLaw, LooseBody):
-    """A driven joint that nothing holds."""
+    """A driven joint without a restoring moment."""
 
     @property
     def held(self) -> Mapping[str, float]:
@@ -274,18 +274,18 @@ class LooseJoint(_OfLaw, LooseBody):
 
 
 def recorded(campaign: Campaign, actuator: str | None = None) -> Recorded:
-    """The motion of a joint by its records: its range, and whether a control drives it.
+    """The recorded motion of a joint: its range, and whether a control drives it.
 
     Args:
-        actuator: its name; None: the only one of the joint.
+        actuator: name of the actuator; None: the only one of the joint.
     """
-    from tunnel_sim.engine.joint_model import Recorded  # only here: MuJoCo is slow to load
+    from tunnel_sim.engine.joint_model import Recorded  # imported here because MuJoCo is slow to load
 
     controlled = bool(campaign.driven_by("drive", "command_rad"))
     if not campaign.driven or campaign.sensor.derivative:  # driven runs of rates are refused later
         return Recorded(reach(campaign), 0.0 if campaign.driven else None, controlled, actuator)
     means = [np.nanmean(run.record.yaw_rad) for run in campaign.runs]
-    middle = float(np.median(means))  # which similar campaigns take off
+    middle = float(np.median(means))  # similar campaigns subtract it
     far = max(float(np.nanmax(np.abs(run.record.yaw_rad - middle))) for run in campaign.runs)
     return Recorded(far, middle, controlled, actuator)
 
@@ -296,8 +296,8 @@ def with_law(campaign: Campaign, law: JointLaw) -> tuple[Campaign, NominalModel]
     The runs state the stiffness at rest, and a control has the gain of the model's actuator.
 
     Raises:
-        TunnelError: when the runs state more than one spring, the wind blows and a reference size is missing, or an
-            input cannot belong to the joint.
+        TunnelError: when the runs state more than one spring, a reference size is missing for a run with wind,
+            or an input cannot belong to the joint.
     """
     springs = {run.spring_stiffness for run in campaign.runs} - {None}
     if len(springs) > 1:
@@ -331,7 +331,7 @@ def _as_control(drive: Input, actuator: Actuator, where: str) -> Input:
     """The command of a position servo as the control of its actuator.
 
     Raises:
-        TunnelError: when the actuator does not hold the joint where it is told to.
+        TunnelError: when the actuator does not hold the joint at the commanded position.
     """
     kp, said = -actuator.servo[1], f"actuator {one_line(actuator.name)!r}"
     if not kp > 0.0:

@@ -1,4 +1,4 @@
-"""A body that nothing holds: a constant moment takes the place of the sensor's zero."""
+"""A body without a restoring moment: a constant moment replaces the sensor's zero."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _NO_ZERO = (
 
 @dataclass(frozen=True)
 class LooseBody(NominalModel):
-    """A driven body that nothing holds: Izz β̈ + C β̇ = M + M0."""
+    """A driven body without a restoring moment: Izz β̈ + C β̇ = M + M0."""
 
     restored: ClassVar[bool] = False
     of_robot: ClassVar[bool] = True
@@ -49,7 +49,7 @@ class LooseBody(NominalModel):
 
     @classmethod
     def describes(cls, campaign: Campaign) -> bool:
-        """Where every run states a stiffness of 0, and the wind is off."""
+        """Whether every run states a stiffness of 0, and the wind is off."""
         return campaign.unrestrained
 
     def untried(self, campaign: Campaign, kinds: Sequence[type[Effect]]) -> dict[str, list[type[Effect]]]:
@@ -73,9 +73,9 @@ class LooseBody(NominalModel):
             )
 
     def moment_factor(self, campaign: Campaign, time: float) -> float:
-        """So that its inertia swings at the reference frequency on a spring of the reference stiffness."""
+        """Let the inertia swing at the reference frequency on a spring of the reference stiffness."""
         inertia = campaign.rig.yaw_inertia
-        if not inertia:  # by the response to the known moments
+        if not inertia:  # from the response to the known moments
             found = [(run.input_gain or 1.0, response_to_input(run)) for run in campaign.runs]
             inertia = float(
                 np.median([gain / response[2] for gain, response in found if response is not None])
@@ -88,11 +88,11 @@ class LooseBody(NominalModel):
 
     @property
     def shares_zero(self) -> bool:
-        """The means of the runs differ."""
+        """False: the means of the runs differ."""
         return False
 
     def starts(self, data: PreparedRuns) -> Iterator[FitStart]:
-        """Inertia and damping by the response to known moments, and no other moment."""
+        """Inertia and damping by the response to the known moments; no other moment."""
         shown = filter(None, map(ShownResponse.of, data.runs))
         found = [(response.inertia, 2.0 * response.rate) for response in shown]
         inertia, loss = np.median(found or [(REFERENCE_INERTIA, 0.0)], axis=0).tolist()
@@ -111,26 +111,26 @@ class LooseBody(NominalModel):
         return REFERENCE_FREQUENCY
 
     def restoring(self, inertia: float, stiffness: float) -> float:
-        """The stiffness with which it would swing at the reference frequency, N m/rad."""
+        """The stiffness with which the body would swing at the reference frequency, N m/rad."""
         del stiffness
         return inertia * (2.0 * np.pi * REFERENCE_FREQUENCY) ** 2
 
     def critical_damping(self, inertia: float, stiffness: float) -> float | None:
-        """None: it does not swing."""
+        """None: the body does not swing."""
         del inertia, stiffness
         return None
 
     def may_scatter(self, kinds: Sequence[type[Effect]]) -> Sequence[type[BetweenRuns]]:
-        """None: the differences are a swing's."""
+        """Empty: chance differences are defined for a swing."""
         del kinds
         return ()
 
     def tells(self, info: ParameterInfo, swing: float) -> bool:
-        """In small swings the rest angle of a body that nothing else holds acts as a constant moment does."""
+        """False for a rest angle: in small swings it acts like a constant moment on a body without a spring."""
         return not (info.beside_spring and swing < SWING)
 
     def coefficient_names(self, names: Sequence[str]) -> tuple[str, ...]:
-        """Inertia, damping and constant moment, as far as they are fitted."""
+        """Inertia, damping and constant moment, if they are fitted."""
         return tuple(name for name in self.coefficient_units if name in names)
 
     def unseen(self, data: PreparedRuns) -> Sequence[str]:

@@ -1,7 +1,7 @@
 """Nominal models: the parameters, equations, starting points, coefficients and sentences of a kind of rig.
 
-One type describes one kind of rig, in one file. It is chosen once for a campaign, and nothing else in the package
-asks which kind it is.
+One type describes one kind of rig, in one file. It is chosen once for a campaign, and no other code in the
+package depends on the kind.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.quantities import AnglePerRun, KgM2
 from tunnel_sim.vocabulary.record import Array
 
-#: Moments of the air in the strongest wind, by which a coefficient's size is judged whatever the air.
+#: Moments of the air in the strongest wind that give the size of a coefficient, whatever the air.
 _AIR_STIFFNESS, _AIR_DAMPING = 4.0, 0.02  # N m/rad and N m s/rad
 
 
 @dataclass(frozen=True)
 class FitStart:
-    """Where a fit of the nominal model starts.
+    """The start of a fit of the nominal model.
 
     Args:
         common: values of the common parameters by name; 0 where not given.
-        own: by run, values of its own parameters by name.
+        own: values of each run's own parameters, by run and name.
     """
 
     common: Mapping[str, float]
@@ -49,14 +49,14 @@ class FitStart:
 class NominalModel:
     """The model of a kind of rig, without any effect.
 
-    A kind overrides what differs for it. All values are in the units of the similar campaign
+    A kind overrides the parts in which it differs. All values are in the units of the similar campaign
     (`diagnosis.model.similarity`); its inertia is 1 where unknown.
 
     Args:
         windy: whether the wind is on in any run of the campaign.
-        mean_speed: of the campaign's runs with the wind on, m/s.
-        own_zeros: whether every run has a zero of the sensor of its own.
-        unknown_gain: whether a run of the campaign has an input whose gain is fitted.
+        mean_speed: mean speed of the campaign's runs with the wind on, m/s.
+        own_zeros: whether the sensor's zero differs from run to run.
+        unknown_gain: whether a run of the campaign has an input with a gain to be fitted.
         in_air: whether the air may add stiffness and damping.
     """
 
@@ -66,29 +66,30 @@ class NominalModel:
     unknown_gain: bool = False
     in_air: bool = True
 
-    #: Whether moments are per unit inertia, since no run shows them in N m.
+    #: Whether moments are per unit inertia, because no run shows them in N m.
     per_inertia: ClassVar[bool] = False
-    #: Whether anything restores the body, so that it swings about a place and its angle does not drift away.
+    #: Whether the body has a restoring moment, so that it swings about a place and its angle does not drift
+    #: away.
     restored: ClassVar[bool] = True
-    #: Whether the body is the joint of a machine, whose springs and wind cannot be chosen.
+    #: Whether the body is the joint of a machine: its springs and wind cannot be chosen.
     of_robot: ClassVar[bool] = False
-    #: Whether it states moments of the angle at its own size, so that the angle cannot be scaled.
+    #: Whether the model states moments at the true size of the angle, so that the angle cannot be scaled.
     own_size: ClassVar[bool] = False
-    #: Whether the resonance of a driven run is known, and need not show in it.
+    #: Whether the resonance of a driven run is known, so that the run need not show it.
     resonance_known: ClassVar[bool] = False
-    #: Units of the coefficients that it states, by name.
+    #: Units of the stated coefficients, by name.
     coefficient_units: ClassVar[Mapping[str, str]] = {"cn_beta": "1/rad", "cn_r": "1/rad"}
 
     # ---- how it is chosen ----
 
     @classmethod
     def describes(cls, campaign: Campaign) -> bool:
-        """Whether it is the model of a campaign for which none is given."""
+        """Whether it is the model of a campaign without a given model."""
         del campaign
         return False
 
     def of(self, campaign: Campaign) -> NominalModel:
-        """The model with what it depends on in a campaign."""
+        """The model with the values that it takes from a campaign."""
         return dataclasses.replace(
             self,
             windy=bool(campaign.in_wind),
@@ -109,28 +110,28 @@ class NominalModel:
     def fits_gain(self, drive: Input) -> bool:
         """Whether the gain of an input is fitted.
 
-        Per unit inertia, a known moment has an unknown gain too: one over the inertia. The motion of the spring's
-        root acts by the spring's stiffness, and the rotation of the base by the inertia.
+        Per unit inertia, a known moment also has an unknown gain: one over the inertia. Motion of the spring's
+        root acts through the spring's stiffness, and rotation of the base through the inertia.
         """
         return self.multiplied_by(drive) == GAIN
 
     def multiplied_by(self, drive: Input) -> str:
-        """The parameter that multiplies the moment of an input as the run states it; empty: none."""
+        """The parameter that multiplies the moment of an input as stated by the run; empty: none."""
         kind = drive.kind
         if kind.by_inertia:
             return "" if self.per_inertia else "yaw_inertia"
         return GAIN if drive.on_body and (self.per_inertia or not drive.gain_stated) else ""
 
     def refuse(self, campaign: Campaign) -> None:
-        """Refuse runs that it cannot describe.
+        """Refuse runs that the model cannot describe.
 
         Raises:
-            TunnelError: names the first of them.
+            TunnelError: names the first such run.
         """
         del campaign
 
     def untried(self, campaign: Campaign, kinds: Sequence[type[Effect]]) -> dict[str, list[type[Effect]]]:
-        """The effects that it cannot have, by the sentence that says why, with a place for their names."""
+        """The effects that the model excludes, by the sentence with the reason and a place for their names."""
         del campaign, kinds
         return {}
 
@@ -147,7 +148,7 @@ class NominalModel:
         return REFERENCE_STIFFNESS / float(np.median(springs))
 
     def similar(self, change: Similarity) -> NominalModel:
-        """The model with constants of its own in the units of the similar campaign."""
+        """The model with its constants in the units of the similar campaign."""
         del change
         return self
 
@@ -159,13 +160,13 @@ class NominalModel:
         return {}
 
     def parameters(self, data: PreparedRuns) -> tuple[Parameter, ...]:
-        """Its parameters, those common to the runs in the order of a fit's vectors."""
+        """The model's parameters; the common ones are in the order of a fit's vectors."""
         named = (*self.inertial(data), *self.air(data), *self.input_gain(data), *self.offset(data))
         own_zero = Parameter("zero", "rad", owner="per_run") if self.own_zeros else None
         return *(one for one in named if one.name not in self.held), *released(own_zero)
 
     def inertial(self, data: PreparedRuns) -> tuple[Parameter, ...]:
-        """Inertia, damping and stiffness, as far as they are fitted."""
+        """Inertia, damping and stiffness, if they are fitted."""
         del data
         return (
             Parameter("yaw_inertia", "kg m2", lower=1e-9, size=0.1),
@@ -184,7 +185,7 @@ class NominalModel:
         )
 
     def input_gain(self, data: PreparedRuns) -> tuple[Parameter, ...]:
-        """The gain of an input, where it is not known."""
+        """The gain of an input, if it is not known."""
         if not self.unknown_gain:
             return ()
         inputs = [float(np.max(np.abs(drive.values))) for drive in data.inputs]
@@ -192,20 +193,20 @@ class NominalModel:
         return (Parameter(GAIN, "N m", size=size),)
 
     def offset(self, data: PreparedRuns) -> tuple[Parameter, ...]:
-        """The sensor's zero, where the runs have one in common."""
+        """The sensor's zero, if it is common to the runs."""
         del data
         return () if self.own_zeros else (Parameter("zero", "rad"),)
 
     @property
     def shares_zero(self) -> bool:
-        """Whether the runs have one zero of the sensor, to which their means can be compared."""
+        """Whether the sensor's zero is common to the runs, so that their means can be compared with it."""
         return not self.own_zeros
 
     def run_settings(self, values: Mapping[str, float], run: RunData) -> RunSettings:
         """The physics of one run.
 
         Args:
-            values: of all parameters by name, also the run's own and the held ones.
+            values: values of all parameters by name, including the run's own and the held ones.
         """
         return self.settings({name: np.array([value]) for name, value in values.items()}, [run]).row(0)
 
@@ -213,8 +214,9 @@ class NominalModel:
         """The physics of several runs.
 
         Args:
-            values: of all parameters by name, also each run's own and the held ones, shape (runs,) each.
-            runs: the same run may be among them with several values.
+            values: values of all parameters by name, including each run's own and the held ones, shape (runs,)
+                each.
+            runs: the runs; a run may occur several times with different values.
         """
         table, names = SettingsTable.empty(len(runs)), tuple(values)
         rows = [
@@ -235,7 +237,7 @@ class NominalModel:
         for name, column in columns.items():
             table[name][:] = column
         table.set(self.law_parameters)
-        moments: dict[tuple[RunData, float, float], InputMoment | None] = {}  # equal ones are one object
+        moments: dict[tuple[RunData, float, float], InputMoment | None] = {}  # equal moments are one object
         for place, (row, run) in enumerate(zip(rows, runs, strict=True)):
             if self.moment:
                 table.program[place] = _program(self.moment, spring[place])
@@ -260,8 +262,8 @@ class NominalModel:
     def moment(self) -> str:
         """The moment beside a linear spring and damper, N m, as an expression; empty: none.
 
-        Of the angle ``b`` (rad) from rest, the rate ``r`` (rad/s) and the stiffness ``Kr`` of the run's spring
-        (N m/rad), as effects of one's own are stated. Effects come beside it.
+        A function of the angle ``b`` (rad) from rest, the rate ``r`` (rad/s) and the stiffness ``Kr`` of the
+        run's spring (N m/rad), in the notation of user-defined effects. Effects are added to it.
         """
         return ""
 
@@ -271,7 +273,7 @@ class NominalModel:
         return 0.0
 
     def possible_leads(self) -> tuple[float, ...]:
-        """Leads that may explain more than it does without one, s, the first of them 0; none: it has no lead."""
+        """Leads that may explain more than no lead, s, the first of them 0; empty: the model has no lead."""
         return ()
 
     def with_lead(self, lead: float) -> NominalModel:
@@ -280,15 +282,15 @@ class NominalModel:
         return self
 
     def notes(self) -> tuple[str, ...]:
-        """How to read the answer, in sentences."""
+        """Remarks on reading the answer, in sentences."""
         return ()
 
     def gain_words(self) -> str:
-        """The gain of the input that the model states, in a sentence; empty: none."""
+        """The gain of the input as stated by the model, in a sentence; empty: none."""
         return ""
 
     def lead_words(self, change: Similarity) -> tuple[str, ...]:
-        """The lead of the motion, in a sentence; none where there is none.
+        """The lead of the motion, in a sentence; none without a lead.
 
         Args:
             change: how the campaign was made similar.
@@ -314,39 +316,39 @@ class NominalModel:
     # ---- its starting points ----
 
     def starts(self, data: PreparedRuns) -> Iterator[FitStart]:
-        """Starting points for its fit; the second where the fit from the first misses the motion."""
+        """Starting points for the model's fit; the second is used if the fit from the first misses the motion."""
         raise NotImplementedError
 
-    # ---- what it says of a motion ----
+    # ---- motion ----
 
     def frequency(self, inertia: KgM2, stiffness: float) -> float:
-        """Frequency of the free motion, Hz; the frequency of the reference rig where nothing restores the body.
+        """Frequency of the free motion, Hz; without a restoring moment, the frequency of the reference rig.
 
         Args:
-            stiffness: of the restoring moment, N m/rad.
+            stiffness: stiffness of the restoring moment, N m/rad.
         """
         return float(np.sqrt(max(stiffness, 1e-12) / inertia) / (2.0 * np.pi))
 
     def restoring(self, inertia: float, stiffness: float) -> float:
-        """The stiffness of that frequency, N m/rad; arguments as in `frequency`."""
+        """The stiffness that gives that frequency, N m/rad; arguments as in `frequency`."""
         del inertia
         return stiffness
 
     def critical_damping(self, inertia: float, stiffness: float) -> float | None:
-        """The critical damping, N m s/rad; None where nothing restores the body."""
+        """The critical damping, N m s/rad; None without a restoring moment."""
         return 2.0 * math.sqrt(inertia * stiffness) if stiffness > 0.0 else None
 
     def may_scatter(self, kinds: Sequence[type[Effect]]) -> Sequence[type[BetweenRuns]]:
-        """The chance differences between runs that it can have."""
+        """The chance differences between runs that the model allows."""
         return [kind for kind in kinds if issubclass(kind, BetweenRuns)]
 
     def fitted_spring(self, value: Mapping[str, float]) -> float | None:
-        """Stiffness of a spring that is fitted, N m/rad; None where it is stated or there is none."""
+        """Stiffness of a fitted spring, N m/rad; None where the stiffness is stated or there is no spring."""
         del value
         return None
 
     def tells(self, info: ParameterInfo, swing: float) -> bool:
-        """Whether the runs tell a parameter of an effect from the model's own.
+        """Whether the runs can distinguish a parameter of an effect from the model's own parameters.
 
         Args:
             swing: largest angle of the motion, rad.
@@ -358,27 +360,27 @@ class NominalModel:
 
     @property
     def moment_unit(self) -> str:
-        """Unit of a moment as it is identified."""
+        """Unit of an identified moment."""
         return "rad/s2" if self.per_inertia else "N m"
 
     def identified_unit(self, unit: str) -> str:
-        """The unit in which a quantity of a unit is identified."""
+        """Unit of an identified quantity, from its unit in SI."""
         return unit
 
     def coefficient_names(self, names: Sequence[str]) -> tuple[str, ...]:
         """The coefficients that a diagnosis states.
 
         Args:
-            names: of the common parameters of the fit.
+            names: names of the common parameters of the fit.
         """
         del names
         return tuple(self.coefficient_units)
 
     def coefficient(self, names: Sequence[str], common: Array, name: str) -> float | None:
-        """A coefficient of a fit in its unit; None where it has none.
+        """A coefficient of a fit in its unit; None if the model has no such coefficient.
 
         Args:
-            names: of the common parameters.
+            names: names of the common parameters.
             common: their values, shape (common,).
         """
         return dict(zip(names, common.tolist(), strict=True)).get(name)
@@ -387,19 +389,19 @@ class NominalModel:
         """Derivative of a coefficient with respect to the common parameters, shape (common,).
 
         Args:
-            names: of the common parameters.
+            names: names of the common parameters.
             common: their values, shape (common,).
-            name: of the coefficient; the derivative is zero where it is held.
+            name: name of the coefficient; the derivative is zero if it is held.
         """
         del common
         return np.array([float(one == name) for one in names])
 
     def bounded_by(self, names: Sequence[str], name: str) -> str | None:
-        """The fitted parameter whose bound limits this coefficient; None where there is none."""
+        """The fitted parameter whose bound limits this coefficient; None if there is none."""
         del names
         return name if name == "mechanical_damping" else None
 
-    # ---- what its runs cannot show, and what to do next ----
+    # ---- limits of the runs, and further runs ----
 
     def blind_spots(self, data: PreparedRuns) -> tuple[str, ...]:
         """The limits of these runs, as clauses; limits of every campaign come last."""
@@ -413,8 +415,8 @@ class NominalModel:
             )
         elif len(speeds) == _TOLD_BY:
             found.append(
-                "a wind-speed offset as opposed to a dependence of Cnβ on the speed, but by the damping: there are "
-                "two wind speeds only"
+                "a wind-speed offset as opposed to a dependence of Cnβ on the speed, except by the damping: there "
+                "are only two wind speeds"
             )
         if self.windy and not data.in_still_air:
             found.append("whether an effect is mechanical or aerodynamic: there is no run with the wind off")
@@ -423,7 +425,7 @@ class NominalModel:
             found.append("how well runs repeat: a single run shows no scatter between runs")
         elif _OF_A_DECAY * len(data.runs) <= len(common) and not data.driven:
             found.append(
-                "how well runs repeat: no run tests another one, and ± is for runs that repeat exactly"
+                "how well runs repeat: no two runs can be compared, and ± assumes runs that repeat exactly"
             )
         last = (_OF_WIND,) if self.windy else ()
         if data.driven:
@@ -445,7 +447,7 @@ class NominalModel:
         return ALWAYS_BLIND[2]
 
     def planned_springs(self, data: PreparedRuns) -> tuple[float, ...]:
-        """Stiffnesses of the springs with which a further run can be made, ascending, N m/rad."""
+        """Stiffnesses of the springs available for a further run, ascending, N m/rad."""
         return data.springs
 
 
@@ -454,17 +456,16 @@ def _expression(text: str) -> Expression:
     return parse(text, frozenset({"b", "r", "Kr"}))
 
 
-@lru_cache(maxsize=64)  # springs of a campaign
+@lru_cache(maxsize=64)  # enough for the springs of a campaign
 def _program(text: str, spring: float) -> tuple[float, ...]:
     """A moment beside spring and damper as the moment law evaluates it."""
     return _expression(text).program({"Kr": spring}, {"b": "angle", "r": "rate"})
 
 
-_OF_A_DECAY = 2  # numbers that a run determines: its frequency and its damping
-_TOLD_BY = (
-    2  # wind speeds: an offset of the speed and a coefficient that depends on it both fit two stiffnesses
-)
-_PHASES = 64  # of a cycle, for its mean
+_OF_A_DECAY = 2  # quantities that a run determines: its frequency and its damping
+# number of wind speeds: an offset of the speed and a coefficient that depends on it both fit two stiffnesses
+_TOLD_BY = 2
+_PHASES = 64  # instants of a cycle, for its mean
 ALWAYS_BLIND = (
     "a constant sensor lag or filter: it only shifts the release",
     "an error of the clock",

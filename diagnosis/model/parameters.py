@@ -1,4 +1,4 @@
-"""The parameters of a fit: names, units, ranges, steps and places in its vectors, said once."""
+"""The parameters of a fit: names, units, ranges, steps and places in its vectors, defined once."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ import numpy as np
 
 from tunnel_sim.vocabulary.record import Array
 
-#: Step of one-sided differences, in a parameter's size. It gives the derivative to 3e-6 and better: the curvature
-#: of a phase over many cycles dominates for longer steps (3e-4 at 1e-5), rounding for shorter ones (1e-4 at 1e-9).
+#: Step of one-sided differences, in a parameter's size. It gives the derivative to 3e-6 and better. With
+#: longer steps the curvature of a phase over many cycles dominates (3e-4 at 1e-5), with shorter ones rounding
+#: (1e-4 at 1e-9).
 _RELATIVE_STEP = 1e-7
 #: Name of the parameter that is the gain of an input.
 GAIN = "drive_gain"
 
-#: Whether the runs share a parameter, or each of them has its own.
+#: Whether a parameter is common to the runs, or differs from run to run.
 Owner = Literal["common", "per_run"]
 
 
@@ -34,8 +35,8 @@ class RunParameterPrior:
     """Prior of a run's own parameter: a normal distribution.
 
     Args:
-        std: its standard deviation, in the parameter's unit.
-        mean: its mean, in that unit.
+        std: standard deviation, in the parameter's unit.
+        mean: mean, in the parameter's unit.
     """
 
     std: float
@@ -47,15 +48,15 @@ class Parameter:
     """One parameter of a fit.
 
     Args:
-        name: of the nominal model's parameter, or ``effect.parameter``.
+        name: name of the nominal model's parameter, or ``effect.parameter``.
         unit: SI, angles in rad; the readings' unit where a parameter has it.
         lower: least value allowed, in the unit.
         upper: greatest value allowed, in the unit.
         size: a typical value, below which steps of finite differences shrink no further, in the unit.
-        of_swing: whether its steps are in proportion to the amplitude of the run; ``size`` is then a multiple of
-            it.
-        effect: name of the effect that it belongs to; empty: the nominal model.
-        prior: on a parameter of a run; None: flat, as for a release.
+        of_swing: whether the parameter's steps are in proportion to the amplitude of the run; ``size`` is then
+            a multiple of the amplitude.
+        effect: name of the effect with this parameter; empty: the nominal model.
+        prior: prior on a parameter of a run; None: flat, as for a release.
     """
 
     name: str
@@ -75,7 +76,7 @@ class Point:
 
     Args:
         common: parameters common to the runs, in the order of `ParameterSet.names`, shape (common,).
-        per_run: of every run its own parameters, in the order of `ParameterSet.own_names`, shape (runs, own).
+        per_run: own parameters of every run, in the order of `ParameterSet.own_names`, shape (runs, own).
     """
 
     common: Array
@@ -95,7 +96,7 @@ class ParameterSet:
 
     @cached_property
     def own(self) -> tuple[Parameter, ...]:
-        """The parameters of every run."""
+        """The own parameters of every run."""
         return tuple(one for one in self.parameters if one.owner == "per_run")
 
     @cached_property
@@ -116,14 +117,14 @@ class ParameterSet:
 
     @cached_property
     def own_places(self) -> Mapping[str, slice]:
-        """Where each effect's phase or instants are among a run's own parameters, by the effects' names."""
+        """Places of each effect's phase or instants among a run's own parameters, by the effects' names."""
         effects = [one.effect for one in self.own]
         first = {effect: effects.index(effect) for effect in dict.fromkeys(effects) if effect}
         return {effect: slice(at, at + effects.count(effect)) for effect, at in first.items()}
 
     @cached_property
     def of_effects(self) -> int:
-        """How many of a run's own parameters belong to effects; they come last."""
+        """Number of a run's own parameters that belong to effects; they come last."""
         return sum(bool(one.effect) for one in self.own)
 
     def places(self, scatter: Sequence[Named]) -> list[int]:
@@ -145,21 +146,21 @@ class ParameterSet:
         return np.asarray(self.precision * (means - point.per_run), np.float64)
 
     def surprise(self, point: Point) -> float:
-        """How far the own parameters are from their priors, in variances, summed; a part of χ²."""
+        """Distance of the own parameters from their priors, in variances, summed; a part of χ²."""
         return float(self.surprises(point).sum()) if self.precision.any() else 0.0
 
     def surprises(self, point: Point) -> Array:
-        """The same by run, shape (runs,); 0 without priors."""
+        """Distance of each run's parameters from their priors, in variances, shape (runs,); 0 without any."""
         if not self.precision.any():
             return np.zeros(len(point.per_run))
         away = self.pull(point)
         return np.asarray(np.sum(away**2 / np.where(self.precision > 0.0, self.precision, 1.0), axis=1))
 
     def value(self, point: Point, name: str, run: int) -> float | None:
-        """A parameter in one run, in its unit; None where there is none of that name.
+        """A parameter in one run, in its unit; None if no parameter has that name.
 
         Args:
-            run: place of the run.
+            run: index of the run.
         """
         if name in self.names:
             return float(point.common[self.names.index(name)])
@@ -169,8 +170,8 @@ class ParameterSet:
         """The point of some values; the others are 0.
 
         Args:
-            common: by name.
-            own: by run, by name.
+            common: values of common parameters, by name.
+            own: values of own parameters, by run, by name.
         """
         return Point(
             np.array([common.get(name, 0.0) for name in self.names]),
@@ -181,7 +182,7 @@ class ParameterSet:
         """Steps for one-sided finite differences of the common parameters, away from bounds, shape (common,).
 
         Args:
-            common: their values, shape (common,).
+            common: values of the common parameters, shape (common,).
         """
         sizes = [max(abs(value), one.size) for one, value in zip(self.common, common, strict=True)]
         steps = _RELATIVE_STEP * np.array(sizes)
@@ -193,14 +194,14 @@ class ParameterSet:
         """Steps for finite differences of a run's own parameters, by parameter, shape (runs,) each.
 
         Args:
-            amplitude: of every run, rad, shape (runs,).
+            amplitude: amplitude of every run, rad, shape (runs,).
         """
         whole = np.ones_like(amplitude)
         return [_RELATIVE_STEP * one.size * (amplitude if one.of_swing else whole) for one in self.own]
 
 
 def released(zero: Parameter | None = None) -> Iterable[Parameter]:
-    """The own parameters of every run: its release, and its sensor's zero where each run has one.
+    """The own parameters of every run: its release, and its sensor's zero if zeros differ from run to run.
 
     The angle (rad) and the rate (rad/s) belong to the sensor's end, at the start of the fitted part.
     """

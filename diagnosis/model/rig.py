@@ -1,4 +1,4 @@
-"""The rig: a body on springs of stated stiffness; and records of one spring that is not stated."""
+"""The rig: a body on springs of stated stiffness; and a body on one spring of unknown stiffness."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from tunnel_sim.vocabulary.dimensions import dimension, in_si, product
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
-_STEP = 1e-5  # of a derivative by central differences, as a share of the parameter
-_LOSS = 0.01  # of a start, in angular frequencies: a small damping
+_STEP = 1e-5  # step of a derivative by central differences, as a share of the parameter
+_LOSS = 0.01  # loss at a start, as a share of the angular frequency: a small damping
 
-#: Parameters of effects that add to the spring's stiffness at small amplitudes, as gravity does.
+#: Parameters of effects that add to the spring's stiffness at small amplitudes, such as gravity's.
 _STIFFNESSES = tuple(
     f"{kind.name}.{kind.parameters()[0].name}"
     for kind in ALL_EFFECTS
@@ -55,14 +55,14 @@ class SpringModel(NominalModel):
 
     @classmethod
     def describes(cls, campaign: Campaign) -> bool:
-        """Where every run states its spring."""
+        """Whether every run states its spring."""
         return all(run.spring_stiffness is not None for run in campaign.runs)
 
     def refuse(self, campaign: Campaign) -> None:
-        """Refuse runs that do not state their spring, where such a model is given.
+        """Refuse runs that do not state their spring, if this model is given.
 
         Raises:
-            TunnelError: names all of them.
+            TunnelError: names all such runs.
         """
         bare = [run.id for run in campaign.runs if run.spring_stiffness is None]
         if bare:
@@ -74,7 +74,7 @@ class SpringModel(NominalModel):
             )
 
     def starts(self, data: PreparedRuns) -> Iterator[FitStart]:
-        """From the runs' spectra; then from their own decays, as `identify` finds them."""
+        """Starts from the runs' spectra, then from their own decays as in `identify`."""
         yield self._start(data, Shown.of(data))
         squares = decay_squares(data)
         if squares is not None:
@@ -90,7 +90,7 @@ class SpringModel(NominalModel):
         return FitStart({**self.dynamics(data, shown), "zero": zero}, own)
 
     def dynamics(self, data: PreparedRuns, shown: Shown) -> dict[str, float]:
-        """Starting values by name, of the zero apart.
+        """Starting values by name, apart from the zero.
 
         Inertia and aerodynamic stiffness are found by linear regression of the runs' frequencies.
         """
@@ -113,16 +113,16 @@ class SpringModel(NominalModel):
 
 @dataclass(frozen=True)
 class PerInertia(SpringModel):
-    """A body on one spring that is not stated: all moments are per unit inertia."""
+    """A body on one spring of unknown stiffness: all moments are per unit inertia."""
 
     per_inertia: ClassVar[bool] = True
     coefficient_units: ClassVar[Mapping[str, str]] = {"omega_n": "rad/s", "zeta": "1"}
-    #: Name of the parameter that is the stiffness of the spring.
+    #: Name of the parameter for the stiffness of the spring.
     of_spring: ClassVar[str] = "stiffness"
 
     @classmethod
     def describes(cls, campaign: Campaign) -> bool:
-        """Where a run states no spring."""
+        """Whether a run states no spring."""
         return any(run.spring_stiffness is None for run in campaign.runs)
 
     def refuse(self, campaign: Campaign) -> None:
@@ -141,12 +141,12 @@ class PerInertia(SpringModel):
             )
 
     def moment_factor(self, campaign: Campaign, time: float) -> float:
-        """So that the inertia is 1 before and after."""
+        """Keep the inertia at 1."""
         del campaign
         return time**-2
 
     def inertial(self, data: PreparedRuns) -> tuple[Parameter, ...]:
-        """The common stiffness in place of the inertia."""
+        """The common stiffness, instead of the inertia."""
         del data
         return (
             Parameter(self.of_spring, "1/s2", lower=0.0, size=10.0),
@@ -159,7 +159,7 @@ class PerInertia(SpringModel):
         return values[self.of_spring]
 
     def dynamics(self, data: PreparedRuns, shown: Shown) -> dict[str, float]:
-        """Starting values by name, of the zero apart."""
+        """Starting values by name, apart from the zero."""
         del data
         loss = _LOSS * float(np.sqrt(shown.typical)) if shown.loss is None else shown.loss
         return {self.of_spring: shown.typical, "mechanical_damping": loss, "drive_gain": shown.gain}
@@ -169,7 +169,7 @@ class PerInertia(SpringModel):
         return value[self.of_spring]
 
     def tells(self, info: ParameterInfo, swing: float) -> bool:
-        """Not what only a spring of stated stiffness tells."""
+        """False for parameters that only a spring of stated stiffness determines."""
         del swing
         return not info.beside_spring
 
@@ -180,7 +180,7 @@ class PerInertia(SpringModel):
         return _PER_INERTIA.get(unit, by_mass)
 
     def coefficient(self, names: Sequence[str], common: Array, name: str) -> float | None:
-        """The natural frequency (rad/s) or the damping ratio of small swings; None of others."""
+        """The natural frequency (rad/s) or the damping ratio of small swings; None for other names."""
         value = dict(zip(names, common.tolist(), strict=True))
         if name not in self.coefficient_units:
             return value.get(name)
@@ -210,13 +210,13 @@ class PerInertia(SpringModel):
         return found
 
     def bounded_by(self, names: Sequence[str], name: str) -> str | None:
-        """The damping; of the frequency the spring where gravity does not restore the body in its place."""
+        """The damping; for the frequency the spring, unless gravity restores the body instead."""
         if name == "zeta":
             return "mechanical_damping"
         return self.of_spring if name == "omega_n" and len(self._stiffnesses(names)) == 1 else None
 
     def _stiffnesses(self, names: Sequence[str]) -> tuple[str, ...]:
-        """The parameters whose sum is the stiffness of small swings; a pendulum's only spring is gravity."""
+        """The parameters that sum to the stiffness of small swings; a pendulum's only spring is gravity."""
         return (self.of_spring, *(name for name in _STIFFNESSES if name in names))
 
     def unseen(self, data: PreparedRuns) -> Sequence[str]:

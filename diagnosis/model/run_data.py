@@ -1,4 +1,4 @@
-"""Runs as the fits see them: samples in blocks, the means of the reading and the stated physics they belong to."""
+"""Runs as the fits see them: samples in blocks, the means of the reading and the stated physics."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from tunnel_sim.vocabulary.run_groups import RunGroups
 class UnevenSamples:
     """Samples that are not evenly spaced, on the uniform raster of the blocks.
 
-    A block without any has a place for one in its middle, so that every block has a mean; it does not count.
+    A block without samples has one place in its middle, so that every block has a mean; it does not count.
 
     Args:
         time: since the start of the first block, increasing, shape (m,), s.
-        block: the block that each sample lies in, shape (m,).
-        count: samples in each block, shape (n,).
+        block: the block of each sample, shape (m,).
+        count: number of samples in each block, shape (n,).
     """
 
     time: Array
@@ -38,7 +38,7 @@ class UnevenSamples:
 
     @classmethod
     def of(cls, record: Record, block: int) -> UnevenSamples:
-        """The samples of a record, in blocks that hold ``block`` of them on average.
+        """The samples of a record, in blocks with ``block`` samples each on average.
 
         The raster starts half a mean interval before the first sample, so that jitter moves few samples into the
         next block.
@@ -59,10 +59,10 @@ class UnevenSamples:
         return np.asarray((sums / np.maximum(self.count, 1)).reshape(*values.shape[:-1], -1), np.float64)
 
     def part(self, first: int, last: int, interval: float) -> UnevenSamples:
-        """The samples of the blocks from one up to another.
+        """The samples from one block up to another.
 
         Args:
-            interval: of a block, s.
+            interval: interval of a block, s.
         """
         inside = slice(*np.searchsorted(self.block, (first, last)))
         return UnevenSamples(
@@ -76,12 +76,12 @@ def hermite_basis(u: Array, derivative: int = 0, interval: float = 1.0) -> Array
     Args:
         u: places in the step, from 0 to 1, shape (n,).
         derivative: 0, 1 or 2.
-        interval: of the step, s.
+        interval: length of the step, s.
 
     Returns:
-        Weights of (start angle, end angle, interval × start rate, interval × end rate), shape (4, n), in units of
-        s to the power of −``derivative``: exact to the integrator's order for the angle, and to one and two orders
-        less for its derivatives.
+        Weights of (start angle, end angle, interval × start rate, interval × end rate), shape (4, n), in units
+        of s to the power of −``derivative``. For the angle they are exact to the integrator's order, for its
+        first and second derivative to one and two orders less.
     """
     basis = (
         [2 * u**3 - 3 * u**2 + 1, -2 * u**3 + 3 * u**2, u**3 - 2 * u**2 + u, u**3 - u**2],
@@ -92,7 +92,7 @@ def hermite_basis(u: Array, derivative: int = 0, interval: float = 1.0) -> Array
 
 
 def means_of(values: Array, count: int) -> Array:
-    """Means of consecutive values, ``count`` in each, along the last axis.
+    """Means of ``count`` consecutive values each, along the last axis.
 
     A product with equal weights takes a fifth of the time of NumPy's mean along a short axis.
     """
@@ -104,24 +104,24 @@ class RunData:
     """One run as the fits see it.
 
     Args:
-        id: of the run.
+        id: id of the run.
         reading: block means, rad, shape (n,); interpolated where a block has no sample.
-        block: samples per block, on average where they are not evenly spaced.
-        interval: between blocks, s.
-        noise: of the mean of ``block`` samples.
-        spring_stiffness: stated, N m/rad; None in normalised form.
-        wind_speed: stated, m/s.
-        air_density: stated, kg/m³; 0 where the wind is off.
-        duration: of the record, s.
+        block: samples per block, on average if they are not evenly spaced.
+        interval: interval between blocks, s.
+        noise: noise of the mean of ``block`` samples.
+        spring_stiffness: stated stiffness, N m/rad; None in normalised form.
+        wind_speed: stated wind speed, m/s.
+        air_density: stated air density, kg/m³; 0 where the wind is off.
+        duration: duration of the record, s.
         start: time left out at the start of the record, s.
-        derivative: which derivative of the angle the reading is: 0, 1 or 2. The units of the reading and its noise
-            follow from it.
-        samples: where they are, if they are not evenly spaced.
-        drive: the moment of a driven run, its times since the start of the record; None of a free decay.
-        multiplied_by: name of the parameter that multiplies that moment; empty: none.
-        stretch_of: id of the run that this is a stretch of; None of a whole run.
-        merges: how many shorter blocks each block was made of.
-        shorter: the means of these, rad, shape (merges · n,); None where ``merges`` is 1.
+        derivative: order of the derivative of the angle that the sensor reads: 0, 1 or 2. It determines the
+            units of the reading and its noise.
+        samples: times of the samples, if they are not evenly spaced.
+        drive: the moment of a driven run, its times since the start of the record; None for a free decay.
+        multiplied_by: name of the parameter that multiplies this moment; empty: none.
+        stretch_of: id of the run to which this stretch belongs; None for a whole run.
+        merges: number of shorter blocks in each block.
+        shorter: the means of the shorter blocks, rad, shape (merges · n,); None where ``merges`` is 1.
     """
 
     id: str
@@ -144,7 +144,7 @@ class RunData:
 
     @property
     def mergeable(self) -> bool:
-        """Whether longer blocks show its motion: angles of a free decay, evenly spaced, in white noise."""
+        """Whether longer blocks show the run's motion: angles of a free decay, evenly spaced, in white noise."""
         return self.drive is None and self.derivative == 0 and self.plain
 
     def merged(self, count: int) -> RunData:
@@ -163,7 +163,7 @@ class RunData:
 
     @cached_property
     def fine(self) -> RunData:
-        """The run in the shorter blocks that its own were made of; itself where they were not."""
+        """The run in the shorter blocks from which its own were made; unchanged if there are none."""
         if self.shorter is None:
             return self
         return dataclasses.replace(
@@ -178,16 +178,16 @@ class RunData:
 
     @property
     def conditions(self) -> tuple[object, ...]:
-        """The dependencies of the moment law and its integration: spring, wind, sampling and input."""
+        """The conditions that determine the moment law and its integration: spring, wind, sampling and input."""
         free = self.spring_stiffness, self.wind_speed, self.air_density, self.interval, self.derivative
         return free if self.drive is None else (*free, id(self.drive), self.start)
 
     def moment(self, gain: float, offset: float = 0.0) -> InputMoment | None:
-        """The moment of the input from the first block on; None of a free decay.
+        """The moment of the input from the first block on; None for a free decay.
 
         Args:
-            gain: the parameter that multiplies the moment, N m per unit of the input or kg m²; ignored where no
-                parameter does.
+            gain: the parameter that multiplies the moment, N m per unit of the input or kg m²; ignored without
+                such a parameter.
             offset: a constant moment beside the input, N m; 0 where the moment of the input is 0 throughout.
         """
         if self._seen_drive is None:
@@ -211,7 +211,7 @@ class RunData:
         )
 
     def with_input(self, **change: Any) -> RunData:
-        """The run with changed fields of its input; a free decay as it is."""
+        """The run with changed fields of its input; a free decay is unchanged."""
         if self.drive is None:
             return self
         return dataclasses.replace(self, drive=dataclasses.replace(self.drive, **change))
@@ -266,16 +266,17 @@ class RunData:
 
     @property
     def plain(self) -> bool:
-        """Whether differences are white residuals after division by one standard deviation."""
+        """Whether differences are white residuals once divided by one standard deviation."""
         return self.samples is None and self.noise.plain
 
     def scaled(self, difference: Array) -> Array:
         """Differences of readings as white residuals, in noise standard deviations.
 
-        Blocks of fewer samples weigh less, and empty ones are 0.
+        Blocks with fewer samples have less weight, and empty ones are 0.
 
         Args:
-            difference: of block means, in the unit of the reading, shape (n,), or several in columns, shape (n, k).
+            difference: differences of block means, in the unit of the reading, shape (n,), or in columns, shape
+                (n, k).
         """
         if self.samples is None:
             return np.asarray(self.noise.white(difference) / self.noise.scale, np.float64)
@@ -287,7 +288,7 @@ class RunData:
         """The inverse of `scaled`: differences of block means in the unit of the reading, 0 in empty blocks.
 
         Args:
-            residual: white, in noise standard deviations, shape (n,).
+            residual: white residuals, in noise standard deviations, shape (n,).
         """
         if self.samples is not None:
             residual = residual / np.sqrt(np.maximum(self.samples.count, 1) / self.block)
@@ -314,13 +315,13 @@ class RunData:
         return means_of(values, self.block)
 
     def in_blocks(self, means: Array) -> Array:
-        """Block means of the run from its own, or from shorter blocks, shape (..., n)."""
+        """Block means of the run from values in its own blocks, or in shorter blocks, shape (..., n)."""
         return means if means.shape[-1] == self.reading.size else means_of(means, self.merges)
 
     def part(self, first: int = 0, last: int | None = None) -> RunData:
-        """The run from a block to before another; None: to the end.
+        """The run from one block up to another; None: to the end.
 
-        Its duration is the record's, less the part left out at the start.
+        The duration is the record's, less the part left out at the start.
         """
         last = self.reading.size if last is None else last
         return dataclasses.replace(
@@ -334,7 +335,7 @@ class RunData:
         )
 
     def beginning(self, blocks: int) -> RunData:
-        """The first blocks of a driven run; a free decay, or a shorter run, as it is."""
+        """The first blocks of a driven run; a free decay, or a shorter run, is unchanged."""
         return self if self.drive is None or self.reading.size <= blocks else self.part(last=blocks)
 
     @property
@@ -343,7 +344,7 @@ class RunData:
         return self.noise.scale * self.noise.over_white
 
     def noise_at(self, frequency: float | Array) -> Array:
-        """Standard deviation of white noise of the same density as the noise at a frequency, rad.
+        """Standard deviation of white noise with the density of this noise at a frequency, rad.
 
         Args:
             frequency: Hz, any shape.
@@ -382,13 +383,13 @@ class PreparedRuns(RunGroups[RunData]):
 
     @property
     def mean_block(self) -> float:
-        """Samples per block on average: a misfit has as many times the excess in block means as in samples."""
+        """Samples per block on average: as many times larger is an excess in block means than in samples."""
         blocks = sum(run.reading.size for run in self.runs)
         return sum(run.reading.size * run.block for run in self.runs) / blocks
 
     @cached_property
     def swing(self) -> float:
-        """The largest angle of the motion from its middle, rad, also where the readings are rates."""
+        """The largest angle of the motion from its middle, rad, also if the readings are rates."""
         turn = 2.0 * np.pi * REFERENCE_FREQUENCY
         return max(0.5 * float(np.ptp(run.reading)) / turn**run.derivative for run in self.runs)
 
@@ -399,7 +400,7 @@ class PreparedRuns(RunGroups[RunData]):
 
     @property
     def springs(self) -> tuple[float, ...]:
-        """Stated stiffnesses, ascending, N m/rad; none where nothing holds the body."""
+        """Stated stiffnesses, ascending, N m/rad; none without a restoring moment."""
         return tuple(sorted({run.spring_stiffness for run in self.runs if run.spring_stiffness}))
 
     @property

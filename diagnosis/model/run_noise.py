@@ -1,6 +1,6 @@
-"""The noise of a run's block means, one type for each kind: how it is made white, and how strong it is.
+"""The noise of a run's block means, one type for each kind: its whitening filter and its strength.
 
-All kinds are noise of evenly spaced samples. Blocks with fewer samples than others are the run's own concern.
+All kinds are noise of evenly spaced samples. Blocks with fewer samples are treated in the run.
 """
 
 from __future__ import annotations
@@ -22,27 +22,27 @@ class RunNoise(ABC):
     """A kind of noise; one that changes along the run overrides `transposed`, `powers_onward` and `part` as well.
 
     Args:
-        variance: of the white noise that `white` makes of it, rad².
+        variance: variance of the white noise after `white`, rad².
     """
 
     variance: float
 
-    #: Whether it is white and equally strong throughout, so that `white` changes nothing.
+    #: Whether the noise is white and equally strong throughout, so that `white` changes nothing.
     plain: ClassVar[bool] = False
 
     @property
     def scale(self) -> float:
-        """Standard deviation of the white noise that `white` makes of it, rad."""
+        """Standard deviation of the white noise after `white`, rad."""
         return float(np.sqrt(self.variance))
 
     @property
     def over_white(self) -> float:
-        """Its standard deviation over `scale`, 1 or more."""
+        """Standard deviation of the noise over `scale`, 1 or more."""
         return 1.0
 
     @abstractmethod
     def white(self, values: Array) -> Array:
-        """Values with white noise, in their unit; of one run or several in columns, shape (n,) or (n, k)."""
+        """Whiten the noise of values, in their unit; of one run or several in columns, shape (n,) or (n, k)."""
 
     @abstractmethod
     def coloured(self, values: Array) -> Array:
@@ -97,10 +97,10 @@ class WhiteNoise(RunNoise):
 
 @dataclass(frozen=True, eq=False)
 class AutoregressiveNoise(RunNoise):
-    """Coloured noise, whose filter is exact from the first value of a record on.
+    """Coloured noise with a filter that is exact from the first value of a record on.
 
     Args:
-        variance: of the errors, rad².
+        variance: variance of the prediction errors, rad².
         whitening: prediction-error filter: each value less its prediction from the earlier ones; 1 and
             the negative autoregressive coefficients, shape (order + 1,), of order 1 or more.
     """
@@ -109,20 +109,20 @@ class AutoregressiveNoise(RunNoise):
 
     @property
     def over_white(self) -> float:
-        """From the prediction of the first value from none."""
+        """By the prediction of the first value, which has no earlier values."""
         return 1.0 / float(_start(self.whitening.tobytes())[0, 0])
 
     def white(self, values: Array) -> Array:
-        """The errors; the first are of predictions from fewer values, scaled to the same variance."""
+        """The prediction errors; the first ones use fewer values, and are scaled to the same variance."""
         start = _start(self.whitening.tobytes())[: len(values), : len(values)]
-        with np.errstate(invalid="ignore"):  # a motion that grew without bound; the caller looks for it
+        with np.errstate(invalid="ignore"):  # a motion that grew without bound; the caller checks for it
             errors = _convolved(values, self.whitening)
             errors[: len(start)] = start @ values[: len(start)]
         return errors
 
     def coloured(self, values: Array) -> Array:
-        """The inverse of `white`: the values behind these errors."""
-        from scipy.signal import lfilter, lfiltic  # only here: slow to load
+        """The inverse of `white`: the values with these prediction errors."""
+        from scipy.signal import lfilter, lfiltic  # imported here because it is slow to load
 
         start = _start(self.whitening.tobytes())[: values.size, : values.size]
         first = solve_triangular(start, values[: len(start)], lower=True)
@@ -141,13 +141,13 @@ class AutoregressiveNoise(RunNoise):
 
 @dataclass(frozen=True, eq=False)
 class NoiseWithMoment(RunNoise):
-    """Noise beside the response to a random moment, which begins at rest with the run.
+    """Noise plus the response to a random moment, which begins at rest with the run.
 
     Args:
-        variance: after both filters, rad².
-        sensor: the noise beside the response; its variance does not matter.
-        numerator: of the filter that makes both white after the sensor's noise alone is white, shape (m,).
-        denominator: of that filter, shape (k,).
+        variance: variance after both filters, rad².
+        sensor: the noise without the response; its variance does not matter.
+        numerator: numerator of the filter that whitens the sum once the sensor's noise is white, shape (m,).
+        denominator: denominator of that filter, shape (k,).
     """
 
     sensor: RunNoise
@@ -160,12 +160,12 @@ class NoiseWithMoment(RunNoise):
         return self.sensor.over_white
 
     def white(self, values: Array) -> Array:
-        """The sensor's noise is made white, then the response."""
-        with np.errstate(invalid="ignore"):  # a motion that grew without bound; the caller looks for it
+        """Whiten the sensor's noise first, then the response."""
+        with np.errstate(invalid="ignore"):  # a motion that grew without bound; the caller checks for it
             return _filtered(self.numerator, self.denominator, self.sensor.white(values))
 
     def coloured(self, values: Array) -> Array:
-        """The response is restored, then the sensor's noise."""
+        """Restore the response first, then the sensor's noise."""
         return self.sensor.coloured(_filtered(self.denominator, self.numerator, values))
 
     def response(self, cycles: Array) -> np.ndarray:
@@ -182,7 +182,7 @@ class NoiseWithMoment(RunNoise):
 
 def _filtered(numerator: Array, denominator: Array, values: Array) -> Array:
     """Values, in columns or in one, after a filter."""
-    from scipy.signal import lfilter  # only here: slow to load
+    from scipy.signal import lfilter  # imported here because it is slow to load
 
     return np.asarray(lfilter(numerator, denominator, values, axis=0), np.float64)
 
@@ -204,7 +204,8 @@ def _convolved(values: Array, taps: Array) -> Array:
     return np.asarray(found[: len(values)], np.float64)
 
 
-@lru_cache(maxsize=32)  # runs of a campaign; SciPy's own convolutions transform the taps in every call
+# enough for the runs of a campaign; SciPy's own convolutions transform the taps in every call
+@lru_cache(maxsize=32)
 def _transform(taps: bytes, size: int) -> np.ndarray:
     return np.asarray(rfft(np.frombuffer(taps), size))
 
@@ -219,7 +220,7 @@ def _start(whitening: bytes) -> Array:
     predictor = np.frombuffer(whitening)
     order = predictor.size - 1
     rows = np.zeros((order, order))
-    variance = 1.0  # of the prediction error, over the whole filter's
+    variance = 1.0  # variance of the prediction error, over the whole filter's
     for m in range(order, 0, -1):
         reflection = predictor[-1]
         left = 1.0 - reflection**2

@@ -1,7 +1,7 @@
-"""A position servo: the moment kp (command − angle) − kv rate holds the joint where it is told to be.
+"""A position servo: the moment kp (command − angle) − kv rate holds the joint at the commanded position.
 
-It is a spring of stiffness kp from the command to the joint, and a damper of kv to the ground. The runs show kv and
-the joint's own damping as a sum.
+It acts as a spring of stiffness kp from the command to the joint, and as a damper of kv to the ground. The runs
+show only the sum of kv and the joint's own damping.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
 _NO_SPRING = "These effects of a spring are not tried, because the servo is not a spring: {}."
-#: Why play is not tried where a servo holds the joint.
+#: Why play is not tried if a servo holds the joint.
 OF_GEAR = (
     "The servo holds the motor. Play would be between motor and link, which requires a model of two bodies, so "
     "these effects are not tried: {}."
@@ -34,7 +34,7 @@ _SLOW = 0.1  # 1/s: a small decay rate of the similar rig
 
 
 def by_command(campaign: Campaign) -> bool:
-    """Whether any run is driven by the command of a servo."""
+    """Whether the command of a servo drives any run."""
     return bool(campaign.driven_by("command_rad"))
 
 
@@ -43,16 +43,16 @@ class _OfServo(NominalModel):
     """The common part of servos of known and unknown gain.
 
     Args:
-        kv: of the servo, N m s/rad; the damping that is fitted comes beside it.
+        kv: kv of the servo, N m s/rad; the fitted damping is added to it.
     """
 
     kv: float = 0.0
 
     of_robot: ClassVar[bool] = True
-    resonance_known: ClassVar[bool] = True  # a servo may be damped so well that none shows
+    resonance_known: ClassVar[bool] = True  # the damping of a servo may hide the resonance
 
     def of(self, campaign: Campaign) -> NominalModel:
-        """With the kv that the runs state."""
+        """The model with the kv stated by the runs."""
         stated = min((drive.servo_kv or 0.0 for drive in campaign.inputs), default=0.0)
         return replace(super().of(campaign), kv=stated)  # type: ignore[call-arg]  # refuse: they are one
 
@@ -110,7 +110,7 @@ class Servo(_OfServo, SpringModel):
     """A joint held by a servo of stated kp: Izz β̈ + (C + kv) β̇ = kp (command − β).
 
     Args:
-        kv: of the servo, N m s/rad; the damping that is fitted comes beside it.
+        kv: kv of the servo, N m s/rad; the fitted damping is added to it.
     """
 
     coefficient_units: ClassVar[Mapping[str, str]] = {
@@ -119,7 +119,7 @@ class Servo(_OfServo, SpringModel):
 
     @classmethod
     def describes(cls, campaign: Campaign) -> bool:
-        """Where a run has a command, and every run states the kp."""
+        """Whether a run has a command, and every run states the kp."""
         return by_command(campaign) and SpringModel.describes(campaign)
 
     def similar(self, change: Similarity) -> NominalModel:
@@ -127,7 +127,7 @@ class Servo(_OfServo, SpringModel):
         return replace(self, kv=change.similar(self.kv, "N m s/rad"))
 
     def starts(self, data: PreparedRuns) -> Iterator[FitStart]:
-        """Inertia and damping by the response to the command (its gain is the kp); then as a rig."""
+        """Inertia and damping by the response to the command (its gain is the kp); then as for a rig."""
         shown = [
             (run.spring_stiffness / response.stiffness, 2.0 * response.rate)
             for run in data.runs
@@ -146,14 +146,14 @@ class ServoPerInertia(_OfServo, PerInertia):
     """A joint held by a servo of unknown kp: all moments are per unit inertia, the kp among them.
 
     Args:
-        kv: of the servo, which is not known either: 0 N m s/rad.
+        kv: kv of the servo, also unknown: 0 N m s/rad.
     """
 
     of_spring: ClassVar[str] = "servo_kp"
 
     @classmethod
     def describes(cls, campaign: Campaign) -> bool:
-        """Where a run has a command, and one states no kp."""
+        """Whether a run has a command, and one states no kp."""
         return by_command(campaign) and PerInertia.describes(campaign)
 
     def refuse(self, campaign: Campaign) -> None:

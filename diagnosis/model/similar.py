@@ -1,4 +1,4 @@
-"""The similar campaign: of a rig of the reference frequency and stiffness that moves as the measured one does."""
+"""The similar campaign: the measured motion on a rig of the reference frequency and stiffness."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ def similar_campaign(campaign: Campaign, model: NominalModel | None = None) -> t
     """The campaign of the similar rig.
 
     Args:
-        model: its nominal model; None: the model of its kind.
+        model: nominal model of the campaign; None: the model of its kind.
 
     Returns:
-        The similar campaign, and how it was made. Its wind-off runs have a median frequency of
-        `REFERENCE_FREQUENCY`, and its springs a median stiffness of `REFERENCE_STIFFNESS`; where no stiffness is
-        stated the inertia is 1 before and after. Where nothing holds the body, its inertia is the one that swings
-        at that frequency on a spring of that stiffness.
+        The similar campaign, and the conversion. Its wind-off runs have a median frequency of
+        `REFERENCE_FREQUENCY`, and its springs a median stiffness of `REFERENCE_STIFFNESS`. If no stiffness is
+        stated, the inertia is 1 before and after. Without a restoring moment, the inertia is chosen to swing at
+        this frequency on a spring of this stiffness.
     """
     rig, sensor = campaign.rig, campaign.sensor
     still = campaign.in_still_air or campaign.runs

@@ -1,9 +1,9 @@
-"""Dynamically similar campaigns: every rig is diagnosed as one of the same frequency and the same stiffness.
+"""Dynamically similar campaigns: every rig is diagnosed as a rig of the same frequency and stiffness.
 
-The equation of motion keeps its form when time is multiplied by s, moments by m, lengths along the flow by s and
-the frontal area by m/s: inertias then change by m s², damping by m s, while angles, wind speeds, air densities, Cnβ
-and Cnr stay as they are. So every interval, frequency and moment inside the diagnosis refers to one rig, whatever
-the time scale of the rig that was measured. A displacement is diagnosed as an angle of a usual size.
+The equation of motion keeps its form when time is multiplied by s, moments by m, lengths along the flow by s
+and the frontal area by m/s. Inertias then change by m s² and damping by m s; angles, wind speeds, air
+densities, Cnβ and Cnr do not change. Every interval, frequency and moment in the diagnosis therefore refers to
+one rig, whatever the time scale of the measured rig. A displacement is diagnosed as an angle of a usual size.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.dimensions import angle_power, dimension
 from tunnel_sim.vocabulary.record import Record, evenly_spaced
 
-REFERENCE_FREQUENCY = 2.0  # of the similar rig, Hz
-REFERENCE_STIFFNESS = 16.0  # median of its springs, N m/rad
+REFERENCE_FREQUENCY = 2.0  # frequency of the similar rig, Hz
+REFERENCE_STIFFNESS = 16.0  # median stiffness of its springs, N m/rad
 #: Inertia of the similar rig where it has no springs, kg m².
 REFERENCE_INERTIA = REFERENCE_STIFFNESS / (2.0 * np.pi * REFERENCE_FREQUENCY) ** 2
 
 
 @dataclass(frozen=True)
 class Similarity:
-    """How a campaign was changed into the similar one.
+    """The conversion of a campaign to the similar one.
 
     Args:
         time: s, the factor on times, dimensionless.
         moment: m, the factor on moments, dimensionless.
-        rest: angle taken off all readings, rad.
+        rest: angle subtracted from all readings, rad.
         reading: unit of the readings.
-        angle: the factor on angles, and on moments beside theirs; 1 but for displacements.
+        angle: the factor on angles, and on moments beside the motion's; 1 except for displacements.
     """
 
     time: float = 1.0
@@ -51,8 +51,8 @@ class Similarity:
         """A value of the similar campaign as a value of the campaign itself.
 
         Args:
-            value: in the unit.
-            unit: SI; one without time or moment leaves the value as it is, as does a speed.
+            value: value in the unit.
+            unit: SI; a unit without time or moment leaves the value unchanged, and so does the unit of a speed.
         """
         return value / self._factor(unit)
 
@@ -60,13 +60,13 @@ class Similarity:
         """A value of the campaign itself as a value of the similar campaign; the inverse of `own`.
 
         Args:
-            value: in the unit.
+            value: value in the unit.
             unit: as in `own`.
         """
         return value * self._factor(unit)
 
     def _factor(self, unit: str) -> float:
-        """Speeds stay as they are, so a length changes as a time does; a mass then changes as a moment does."""
+        """Speeds do not change, so a length changes like a time; a mass then changes like a moment."""
         kg, metres, seconds = dimension(unit)
         motion = self.angle ** angle_power(unit)
         if kg == seconds == 0.0:  # the rig's sizes have rules of their own
@@ -78,9 +78,11 @@ AS_MEASURED = Similarity()
 """The similarity of a campaign with itself."""
 
 
-_PADDING = 8  # times the record, which places the peak of a few cycles to within a few per cent
-_MOST_CORNER = 8.0  # times the motion: of a body that is mostly damping the inertia hardly shows
-_MOTION = 0.999  # share of the swing's power that the lines of the motion hold: beyond them is noise
+# zero padding, in lengths of the record: it places the peak of a few cycles to within a few per cent
+_PADDING = 8
+# maximum corner frequency over the motion's: in a mostly damped body the inertia hardly shows
+_MOST_CORNER = 8.0
+_MOTION = 0.999  # share of the swing's power in the lines of the motion; the rest is noise
 
 
 def frequency(record: Record) -> float:
@@ -95,13 +97,14 @@ def free_frequency(run: Run, derivative: int = 0) -> float:
     """The frequency at which a run would swing freely.
 
     Args:
-        derivative: of the angle that the readings are.
+        derivative: order of the derivative of the angle that the sensor reads.
 
     Returns:
-        The frequency of the decay, Hz. For a driven run, whose motion may follow its input, it is the frequency of
-        the resonance between them, or of the peak of the motion where they show none. A body that nothing holds
-        does not swing: it is the mean frequency of the power of the rate, or the frequency above which inertia
-        exceeds damping if that is higher.
+        The frequency of the decay, Hz. The motion of a driven run may follow its input: for it, the frequency
+        is the resonance between them, or the peak of the motion if they show none. A body without a restoring
+        moment does not
+        swing: the frequency is the mean of the power of the rate, or the frequency above which inertia exceeds
+            damping, if that is higher.
     """
     found = response_to_input(run, derivative)
     if run.unrestrained:
@@ -118,7 +121,7 @@ def free_frequency(run: Run, derivative: int = 0) -> float:
 
 
 def reach(campaign: Campaign) -> float:
-    """The greatest displacement in the records, rad; by way of the frequency where the sensor reads a rate."""
+    """The greatest displacement in the records, rad; by way of the frequency if the sensor reads a rate."""
     found = []
     for run in campaign.runs:
         readings = run.record.yaw_rad[np.isfinite(run.record.yaw_rad)]
@@ -131,10 +134,10 @@ def response_to_input(run: Run, derivative: int = 0) -> tuple[float, float, floa
     """Decay rate (1/s), stiffness (1/s²) and gain (rad/s² per unit) of a driven run by itself.
 
     Args:
-        derivative: of the angle that the readings are.
+        derivative: order of the derivative of the angle that the sensor reads.
 
     Returns:
-        As `driven_start`; None of a free decay too.
+        As `driven_start`; None for a free decay, too.
     """
     if run.drive is None:
         return None

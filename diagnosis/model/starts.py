@@ -1,4 +1,4 @@
-"""Motions as the records show them before any fit: frequencies, losses and gains of the runs, each by itself."""
+"""Motions in the records before any fit: frequencies, losses and gains of each run by itself."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from identification.signal.forcing import driven_start
 from identification.signal.frequency import peak_of_swing, starting_decay
 from tunnel_sim.vocabulary.record import Array, Record
 
-_STILL = 0.02  # of the largest swing, below which a run counts as at rest
+_STILL = 0.02  # share of the largest swing below which a run counts as at rest
 _PADDING = 16  # zero padding of the spectrum that gives the first frequency
 
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """The quantities shown by the runs, each by itself.
+    """The quantities that each run shows by itself.
 
     Args:
         squares: angular frequency squared, shape (runs,), 1/s².
         swing: standard deviation of the reading, shape (runs,), rad.
         moving: 1 for a run that moves, 0 for one at rest, which has no frequency, shape (runs,).
-        loss: rate of the energy's loss by the driven runs, 1/s; None where they show none.
-        gain: of an input that is not known, rad/s² per unit; 0 where no run shows it.
+        loss: rate of energy loss from the driven runs, 1/s; None where they show none.
+        gain: gain of an unknown input, rad/s² per unit; 0 where no run shows it.
         zeros: mean readings, by run, rad.
     """
 
@@ -74,10 +74,10 @@ class Shown:
 
 
 def decay_squares(data: PreparedRuns) -> list[float] | None:
-    """Angular frequency squared of the runs by their own decays, 1/s²; None where a run has none, or is driven.
+    """Angular frequency squared of each run from its own decay, 1/s²; None for a driven run or without a decay.
 
-    A frequency that depends on the amplitude spreads the peak of a spectrum, and χ² has a minimum for every cycle
-    more or less that fits the record.
+    A frequency that depends on the amplitude broadens the peak of a spectrum, and χ² has a minimum for every
+    cycle too many or too few in the record.
     """
     if data.driven:
         return None
@@ -97,9 +97,9 @@ class ShownResponse:
     """The response of a run to its input.
 
     Args:
-        rate: of the decay, 1/s.
-        stiffness: over the inertia, 1/s².
-        gain: rad/s² per unit of the input.
+        rate: decay rate, 1/s.
+        stiffness: stiffness over inertia, 1/s².
+        gain: acceleration per unit of the input, rad/s².
         scale: moment of the input, N m per unit.
     """
 
@@ -112,7 +112,7 @@ class ShownResponse:
     def of(cls, run: RunData) -> ShownResponse | None:
         """The response of a run; None where it has no input or shows no resonance.
 
-        Of a body without a spring the gain must be positive, in N m of the input.
+        Without a spring the gain must be positive, in N m of the input.
         """
         if run.drive is None:
             return None

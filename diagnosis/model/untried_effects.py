@@ -1,4 +1,4 @@
-"""Effects that the inputs of driven runs leave open, and what is said of them."""
+"""Effects that the inputs of driven runs exclude, with the reason for each."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _TURNING_BASE = (
 
 
 def untried_by_inputs(campaign: Campaign, kinds: Sequence[type[Effect]]) -> dict[str, list[type[Effect]]]:
-    """The effects whose moment does not follow from an input, by the sentence that says why.
+    """The effects with a moment that does not follow from an input, by the sentence that gives the reason.
 
     Args:
         kinds: effects to try.

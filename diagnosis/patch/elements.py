@@ -1,4 +1,4 @@
-"""The native elements of MuJoCo that a law is written as: each is fitted, written, and says how it differs."""
+"""The native elements of MuJoCo for writing a law: each is fitted, written, and states how it differs."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from tunnel_sim.effects.drives import ActuatorEffect
 from tunnel_sim.engine.joint_patch import Into, Start, creep_rate, history_of
 from tunnel_sim.vocabulary.errors import TunnelError
 
-# the plugin wants them
+# required by the plugin
 _AIR = ("air_density", "wind_speed", "frontal_area", "reference_length", "cn_beta", "cn_r")
 _PLUGIN = "vwt.yaw_moment"
-_NO_MOTOR = 1e-9  # N m/A: of a motor that is a friction alone; MuJoCo wants more than 0
+_NO_MOTOR = 1e-9  # N m/A: torque constant of a motor that is only a friction; MuJoCo requires more than 0
 _STIFF_STEPS = 2.0  # time constant of frictionloss in steps: the shortest that MuJoCo accepts
 
 
@@ -30,15 +30,15 @@ class NativeElement:
 
     @classmethod
     def fit(cls, law: FittedLaw) -> Self | None:
-        """The element of a law; None where the law has none."""
+        """The element for a law; None if the law does not need it."""
         raise NotImplementedError
 
     def write(self, into: Into) -> Into:
-        """Write it into a model, after the elements before it in `ELEMENTS`."""
+        """Write the element into a model, after the elements before it in `ELEMENTS`."""
         raise NotImplementedError
 
     def begin(self, into: Into, key: mujoco.MjsKey, start: Start) -> None:
-        """Write its state at the start of a run into a key frame."""
+        """Write the element's state at the start of a run into a key frame."""
 
     def limits(self, model: mujoco.MjModel, rest: float, *, slide: bool) -> tuple[Fact, ...]:
         """Differences between the element in the engine and the law.
@@ -63,23 +63,24 @@ class Inertia(NativeElement):
 
     @classmethod
     def fit(cls, law: FittedLaw) -> Self:
-        """The inertia, less the part that the steps of the engine cause."""
+        """The inertia, less the part that the engine's steps cause."""
         found = law.own(law.physics.yaw_inertia, "kg m2")
         if law.steps is None:
             return cls(found)
         return cls(found - law.steps(law.own(float(law.moments.damping[0]), "N m s/rad")))
 
     def write(self, into: Into) -> Into:
-        """Added inertia as armature; reduced inertia as a smaller armature, or as bodies drawn in towards the axis.
+        """Added inertia as armature; reduced inertia as a smaller armature, or as bodies moved towards the axis.
 
-        Bodies of a times the mass at 1/a times the distance from the axis have the same moment of gravity and 1/a
-        times the inertia. On a slide they lose mass instead; the share of the weight that remains is `Into.weight`.
+        Bodies with a times the mass at 1/a times the distance from the axis have the same moment of gravity and
+        1/a times the inertia. On a slide they lose mass instead; the remaining share of the weight is
+        `Into.weight`.
         """
         spec, before, law = into.spec, into.before, into.given.law
         written = replace(into, inertia=self.inertia)
         rotors = float(
             np.sum(before.actuator_gear[:, 0] ** 2 * before.actuator_armature)
-        )  # they are unchanged
+        )  # the bodies are unchanged
         armature = float(before.dof_armature[0]) + self.inertia - law.inertia
         into.joint.armature = max(armature, 0.0)
         if armature >= 0.0:
@@ -110,7 +111,7 @@ class Inertia(NativeElement):
 
 @dataclass(frozen=True)
 class Spring(NativeElement):
-    """A restoring moment beside the model's.
+    """A restoring moment added to the model's.
 
     Args:
         added: coefficients of 1, b, b² and b³ of the displacement b from rest, N m, N m/rad, N m/rad² and N m/rad³.
@@ -127,7 +128,7 @@ class Spring(NativeElement):
         return cls((k0, k1, k2, k3))
 
     def write(self, into: Into) -> Into:
-        """The sum of the joint's own spring and the added one, about the position at which it vanishes."""
+        """The sum of the joint's own spring and the added one, about the position at which the sum vanishes."""
         spec, before, given = into.spec, into.before, into.given
         spring = np.polynomial.Polynomial([0.0, before.jnt_stiffness[0], *before.jnt_stiffnesspoly[0]])
         offset = given.law.rest - float(before.qpos_spring[0])
@@ -152,7 +153,7 @@ class Spring(NativeElement):
 
     @staticmethod
     def _write_bias(into: Into, moment: float) -> None:
-        """A constant moment as the bias of the actuator that drives the joint, or of an added one."""
+        """A constant moment as the bias of the actuator that drives the joint, or of an added actuator."""
         own, name = into.given.law.actuator, into.given.joint
         if moment == 0.0:
             return
@@ -169,7 +170,7 @@ class Spring(NativeElement):
 
 @dataclass(frozen=True)
 class Damper(NativeElement):
-    """Damping beside the joint's.
+    """Damping added to the joint's.
 
     Args:
         added: coefficients of ḃ, |ḃ|ḃ and ḃ³, N m s/rad, N m s²/rad² and N m s³/rad³.
@@ -186,10 +187,10 @@ class Damper(NativeElement):
         return cls((c0, c1, c2))
 
     def write(self, into: Into) -> Into:
-        """The sum of both as the damping of the joint."""
+        """The damping of the joint: the sum of its own and the added damping."""
         before, joint = into.before, into.joint
         joint.damping = np.array([before.dof_damping[0], *before.dof_dampingpoly[0]]) + self.added
-        joint.damping[0] = max(joint.damping[0], 0.0)  # a damping fitted as 0 less the model's own, rounded
+        joint.damping[0] = max(joint.damping[0], 0.0)  # a sum that should be 0, rounded below it
         return into
 
 
@@ -198,9 +199,9 @@ class DryFriction(NativeElement):
     """The whole dry friction of the joint.
 
     Args:
-        moment: of the plugin's own friction the greatest, N m.
+        moment: friction moment; for the plugin's own friction its greatest value, N m.
         presliding: deflection at which its contact slides, rad; 0: none.
-        own: numerics of the plugin's own friction, by name, N m and rad/s; empty: the friction is MuJoCo's.
+        own: numerics of the plugin's own friction, by name, N m and rad/s; empty: MuJoCo's friction.
     """
 
     moment: float
@@ -209,19 +210,20 @@ class DryFriction(NativeElement):
 
     @classmethod
     def fit(cls, law: FittedLaw) -> Self:
-        """The friction and its range, angles as positions of the joint."""
+        """The friction and its range; angles are positions of the joint."""
         moments, numerics = law.moments, dict[str, float]()
         for name, size, unit in moments.contact:
             numerics[name] = law.own(size, unit) + (law.rest if name == "load_angle" else 0.0)
-        if power := numerics.get("friction_exponent"):  # of rates in the campaign's own time
+        if power := numerics.get("friction_exponent"):  # rates in the campaign's own time
             numerics["friction_moment"] *= law.own(1.0, "rad/s") ** -power
         return cls(law.own(moments.loss, "N m"), law.own(moments.presliding, "rad"), tuple(numerics.items()))
 
     def write(self, into: Into) -> Into:
-        """Friction as ``frictionloss``, with presliding as a motor without a control has it, or as the plugin's.
+        """Friction as ``frictionloss``; with presliding as a motor without a control; or as the plugin's friction.
 
-        MuJoCo has LuGre's friction in motors alone. Without a damping of its own and a rise near rest it is Dahl's.
-        The deflection has a lower limit, so that the oscillation of the contact is stable with the model's steps.
+        MuJoCo has LuGre's friction in motors only. Without contact damping and a rise near rest it is Dahl's
+        friction. The deflection has a lower limit, which keeps the oscillation of the contact stable with the
+        model's steps.
         """
         joint, step = into.joint, into.spec.option.timestep
         rigid = self.presliding == 0.0 and not self.own
@@ -244,7 +246,7 @@ class DryFriction(NativeElement):
         return replace(into, states=into.states + 1)
 
     def limits(self, model: mujoco.MjModel, rest: float, *, slide: bool) -> tuple[Fact, ...]:
-        """The rate up to which ``frictionloss`` yields as a damper."""
+        """The rate up to which ``frictionloss`` acts as a damper."""
         soft = self.moment > 0.0 and self.presliding == 0.0 and not self.own
         creep = creep_rate(model, rest) if soft else 0.0
         return (
@@ -258,13 +260,13 @@ class DryFriction(NativeElement):
 class Control(NativeElement):
     """Elements between the control of an actuator and its moment.
 
-    MuJoCo delays the control, clips it and then filters it. The range of the control clips it before the filter,
-    and excludes the bias of a servo; ``forcerange`` would do neither.
+    MuJoCo delays the control, clips it and then filters it. The range of the control clips it before the
+    filter, and does not include the bias of a servo; ``forcerange`` would clip after the filter, with the bias.
 
     Args:
         limit: greatest control, in its own unit; 0: the model's own range.
-        lag: time constant of its filter, s; 0: none.
-        delay: of the control, s; 0: none.
+        lag: time constant of the actuator's filter, s; 0: none.
+        delay: delay of the control, s; 0: none.
     """
 
     index: int
@@ -274,10 +276,10 @@ class Control(NativeElement):
 
     @classmethod
     def fit(cls, law: FittedLaw) -> Self | None:
-        """The limits; None where there are none, or where MuJoCo has no element for one of them.
+        """The limits; None if there are none, or MuJoCo has no element for one of them.
 
-        These are a rate limit, which acts between the other two, a soft limit, and an input that acts earlier than
-        stated.
+        MuJoCo has no element for a rate limit, which acts between the other two, for a soft limit, or for an
+        input that acts earlier than stated.
         """
         actuator = law.law.actuator
         if actuator is None or law.controlled is None:
@@ -340,12 +342,12 @@ class ServoGain(NativeElement):
 
     @classmethod
     def fit(cls, law: FittedLaw) -> Self | None:
-        """The kp, where it is fitted."""
+        """The kp, if it is fitted."""
         kp = law.fitted.get("servo_kp")
         return None if kp is None else cls(law.own(kp, "N m/rad"))
 
     def write(self, into: Into) -> Into:
-        """Gain and bias of its actuator."""
+        """Gain and bias of the servo's actuator."""
         if (own := into.given.law.actuator) is not None:
             servo, share = into.spec.actuators[own.index], -self.kp / own.servo[1]
             servo.gainprm[0] *= share
@@ -369,10 +371,10 @@ def with_plugin(into: Into, numerics: Mapping[str, float | Sequence[float]]) -> 
 
 @dataclass(frozen=True)
 class PluginMoment(NativeElement):
-    """A moment of the plugin, which MuJoCo's own elements do not have.
+    """A moment of the plugin that MuJoCo's own elements do not have.
 
     Args:
-        program: of the moment (``mjcf/plugin/expression.h``), in the joint's position.
+        program: program of the moment (``mjcf/plugin/expression.h``), in the joint's position.
     """
 
     program: tuple[float, ...]
@@ -404,7 +406,7 @@ class PluginMoment(NativeElement):
 
 @dataclass(frozen=True)
 class SensorNoise(NativeElement):
-    """Noise on the joint's position sensor, which is added if missing.
+    """Noise on the joint's position sensor; the sensor is added if missing.
 
     Args:
         std: rad.
@@ -441,7 +443,7 @@ class FoundLaw:
     """The law found for a joint, in the units of the given model.
 
     Args:
-        differences: where a native element follows another law, and causes left out.
+        differences: differences between a native element and the law, and causes left out.
     """
 
     elements: tuple[NativeElement, ...]
@@ -455,18 +457,18 @@ class FoundLaw:
         return cls(elements, (*law.moments.differences, *_unwritten(law, elements)))
 
     def element(self, kind: type[Element]) -> Element | None:
-        """The element of a kind; None: it has none."""
+        """The element of a kind; None if the law has none."""
         return next((one for one in self.elements if isinstance(one, kind)), None)
 
     @property
     def by_plugin(self) -> bool:
-        """Whether MuJoCo's own elements do not suffice."""
+        """Whether the law needs the plugin beside MuJoCo's own elements."""
         friction = self.element(DryFriction)
         return self.element(PluginMoment) is not None or (friction is not None and bool(friction.own))
 
 
 def _unwritten(law: FittedLaw, elements: Sequence[NativeElement]) -> tuple[Fact, ...]:
-    """The causes that no element has."""
+    """The causes for which there is no element."""
     effects, by_control = law.problem.effects, any(isinstance(one, Control) for one in elements)
     left_out = {
         "rod": law.physics.rod_twist is not None,

@@ -25,13 +25,15 @@ class FittedLaw:
     """The law of a fit.
 
     Args:
-        common: its common parameters, shape (common,).
-        release: of a run, shape (own,).
-        index: of that run, with the wind off.
-        noise: of the sensor, rad; 0: not written.
-        controlled: own parameters and index of a run in which the model's actuator is controlled; None: none.
-        steps: from the added damping, N m s/rad, to the apparent inertia due to the engine's steps, kg m²; None: 0.
-        native_only: whether every moment is written as the nearest native element, however far it is.
+        common: common parameters of the fit, shape (common,).
+        release: own parameters of a run with the wind off, shape (own,).
+        index: index of that run.
+        noise: noise of the sensor, rad; 0: not written.
+        controlled: own parameters and index of a run that controls the model's actuator; None: none.
+        steps: function from the added damping, N m s/rad, to the apparent inertia due to the engine's steps, kg
+            m²;
+        None: 0.
+        native_only: whether every moment is written as the nearest native element, however different it is.
     """
 
     problem: Problem
@@ -73,7 +75,7 @@ class FittedLaw:
 
     @cached_property
     def moments(self) -> NativeMoments:
-        """The moments beside the given model's, in the units of the similar campaign."""
+        """The moments added to the given model's, in the units of the similar campaign."""
         problem, physics, law = self.problem, self.physics, self.law
         data, model, fitted = problem.data, problem.data.model, self.fitted
         zero = problem.zero(self.common, self.release)
@@ -109,7 +111,7 @@ class FittedLaw:
         return total.plus(friction)
 
     def _loads(self) -> list[tuple[Array, Array]]:
-        """Every run's angle from rest, rad, and its actuator's moment, N m, each of shape (n,)."""
+        """The angle from rest, rad, and the actuator's moment, N m, of every run, each of shape (n,)."""
         problem, found = self.problem, list[tuple[Array, Array]]()
         zero = problem.zero(self.common, self.release)
         for run in problem.data.runs:

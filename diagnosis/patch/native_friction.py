@@ -1,4 +1,4 @@
-"""Friction of any form in MuJoCo: its own elements as far as they apply, and the plugin's friction for the rest."""
+"""Friction of any form in MuJoCo: its own elements as far as they apply, else the plugin's friction."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tunnel_sim.physics.moment_law import WEIGHTS, parameter_units
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import JointLaw
 
-#: What friction depends on, in the words of the facts that the plugin adds it.
+#: The variables of a friction that needs the plugin, in the words of the facts.
 ON_RATE = "friction's dependence on the rate"
 ON_GRAVITY = "friction's dependence on gravity's moment"
 ON_ACTUATOR = "friction's dependence on the actuator's moment"
@@ -22,11 +22,11 @@ ON_ACTUATOR = "friction's dependence on the actuator's moment"
 
 @dataclass(frozen=True)
 class Carried:
-    """The load that a joint carries in the runs: the greater of gravity's moment and an actuator's.
+    """The load that a joint carries in the runs: gravity's moment or an actuator's, whichever is greater.
 
     Args:
-        mean: over the distance travelled, N m.
-        greatest: N m.
+        mean: mean load over the distance travelled, N m.
+        greatest: greatest load, N m.
         by_actuator: whether an actuator's moment exceeds gravity's anywhere.
     """
 
@@ -51,7 +51,7 @@ class Carried:
 
 
 def _weight(parameters: Mapping[str, float]) -> tuple[float, float]:
-    """Gravity's moments as one: the greatest moment, N m, and the angle of its rest, rad."""
+    """The sum of gravity's moments: its greatest value, N m, and the angle of its rest, rad."""
     given = [(parameters.get(size, 0.0), parameters.get(rest, 0.0)) for size, rest in WEIGHTS]
     found = sum(size * np.exp(-1j * rest) for size, rest in given)
     return float(np.abs(found)), -float(np.angle(found))
@@ -67,18 +67,18 @@ def native_friction(
 ) -> NativeMoments:
     """The friction of a moment law in the elements of MuJoCo.
 
-    Presliding friction becomes a ``dcmotor`` without a control (``lugre``), which is Dahl's where it has no
-    damping of its own. Friction that depends on the rate becomes ``frictionloss`` and the joint's polynomial
-    damping where their error is within the allowance. All other friction is the plugin's own. Without the plugin,
-    friction that depends on the load has its mean.
+    Presliding friction becomes a ``dcmotor`` without a control (``lugre``), which is Dahl's friction without
+    contact damping. Friction that depends on the rate becomes ``frictionloss`` and polynomial damping of the
+    joint if their error is within the allowance. All other friction is the plugin's own. Without the plugin,
+    friction that depends on the load takes its mean.
 
     Args:
         parameters: of the moment law, by name.
         rates: positive rates in the runs, rad/s, shape (n,).
-        law: of the joint as the model has it.
-        damping: to add to the joint's, N m s/rad.
+        law: law of the joint in the given model.
+        damping: damping to be added to the joint's, N m s/rad.
         may_miss: greatest error of a polynomial, as a share of the greatest friction; infinite: no plugin.
-        carried: in the runs, by friction that depends on the load.
+        carried: load in the runs, for friction that depends on it.
     """
     friction, said = friction_of(parameters), tuple[Fact, ...]()
     if friction.load and may_miss == np.inf:

@@ -1,4 +1,4 @@
-"""Moments on a joint as MuJoCo has them: polynomials, dry friction, and a program of the plugin."""
+"""Moments on a joint in MuJoCo: polynomials, dry friction, and a program of the plugin."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tunnel_sim.vocabulary.record import Array
 PATCHED_MISSES: Final = 0.02
 """Maximum error of a polynomial in the patched model, as a share of the largest moment. Judgement."""
 
-GRID = 201  # angles, and rates, at which moments are compared
+GRID = 201  # number of angles, and of rates, at which moments are compared
 _NAMES = frozenset(
     {"b", "r", "Kr", "gravity_angle", *TEXTBOOK_POWERS, *(name for name, *_ in (*OF_ANGLE, *OF_RATE))}
 )
@@ -29,12 +29,12 @@ class NativeMoments:
     Args:
         spring: added restoring moment, the coefficients of 1, b, b² and b³, N m to N m/rad³, shape (4,).
         damping: added coefficients of ḃ, |ḃ|ḃ and ḃ³, N m s/rad, N m s²/rad² and N m s³/rad³, shape (3,).
-        loss: sliding friction of the joint; of the plugin's friction the greatest in the runs, N m.
+        loss: sliding friction of the joint, N m; for the plugin's friction the greatest in the runs.
         presliding: deflection at which a contact of that friction slides, rad or m; 0: none.
         program: of a further moment of the plugin; empty: none.
-        contact: numerics of the plugin's own friction, with their values and units, angles from rest; empty: the
-            friction is MuJoCo's.
-        differences: where the native element follows another law, and causes left out.
+        contact: numerics of the plugin's own friction, with their values and units, angles from rest; empty:
+            MuJoCo's friction.
+        differences: differences between the native element and the law, and causes left out.
     """
 
     spring: Array = field(default_factory=lambda: np.zeros(4))
@@ -46,7 +46,7 @@ class NativeMoments:
     differences: tuple[Fact, ...] = ()
 
     def plus(self, other: NativeMoments) -> NativeMoments:
-        """The sum of both; dry friction is in one of them."""
+        """The sum of both; only one of them has dry friction."""
         both = self.program and other.program
         return NativeMoments(
             self.spring + other.spring,
@@ -68,7 +68,7 @@ def with_terms(
         known: parameters of the moment law and the stiffness ``Kr``, by name.
         reach: greatest angle from rest, rad.
         rate: greatest rate, rad/s.
-        own: damping of the joint as the model has it, N m s/rad; the sum is not negative.
+        own: damping of the joint in the given model, N m s/rad; the sum is not negative.
         may_miss: greatest error of a polynomial, as a share of the greatest moment; infinite: no plugin.
     """
     total, b, r = start, np.linspace(-reach, reach, GRID), np.linspace(-rate, rate, GRID)
@@ -105,18 +105,18 @@ def with_terms(
 
 
 def nearest_polynomial(powers: Array, wanted: Array, least: Array) -> Array:
-    """Coefficients of least squares with lower bounds; without them where they are met.
+    """Least-squares coefficients with lower bounds; the unbounded ones if they meet the bounds.
 
     Args:
         powers: shape (n, m).
         wanted: shape (n,).
-        least: shape (m,), infinite where there is none.
+        least: lower bounds, shape (m,), infinite for no bound.
     """
     sizes = np.max(np.abs(powers), axis=0)
     found: Array = np.linalg.lstsq(powers / sizes, wanted, rcond=1e-12)[0] / sizes
     if np.all(found >= least):
         return found
-    from scipy.optimize import lsq_linear  # only here: the bounds seldom matter
+    from scipy.optimize import lsq_linear  # imported here because the bounds seldom matter
 
     bounded: Array = lsq_linear(powers / sizes, wanted, (least * sizes, np.inf)).x / sizes
     return bounded

@@ -40,11 +40,11 @@ from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Actuator
 
 Simulate = Callable[[Array, Start, float], Motion]
-"""From common parameters, a run's start and a duration (s) to a motion in the measured rig's units."""
+"""Function from common parameters, a run's start and a duration (s) to a motion in the measured rig's units."""
 
 _RELEASE_STEPS = 2  # Gauss–Newton steps of a run's start in the engine
-_SHIFT = 1e-4  # of the start, for its derivatives
-_NO_DROP = 1e-6  # of the mean squared residual: a step that promises less is not simulated
+_SHIFT = 1e-4  # shift of the start, for its derivatives
+_NO_DROP = 1e-6  # share of the mean squared residual: a step with a smaller predicted gain is not simulated
 
 
 def native_closure(
@@ -55,16 +55,16 @@ def native_closure(
     simulate: Simulate,
     native: frozenset[str] = frozenset(),
 ) -> tuple[NativeClosure, dict[int, Restart]]:
-    """Simulate held-out runs with the patched model of the fit that has not used them; only with the wind off.
+    """Simulate held-out runs with the patched model of a fit that did not use them; only with the wind off.
 
     Returns:
-        With the restarts of the runs held out as a whole, by index.
+        Also return the restarts of the runs held out as a whole, by index.
 
     Args:
         nominal: fit of the given model.
         chosen: fit with the causes.
-        nominal_out: runs held out of the first.
-        chosen_out: runs held out of the second.
+        nominal_out: runs held out of the nominal fit.
+        chosen_out: runs held out of the fit with the causes.
         native: as in `engine_residual`.
 
     Raises:
@@ -91,22 +91,24 @@ def native_closure(
         for number in range(FOLDS):
             out = [turn == number for turn in turns]
             try:
-                point, _ = fit_seen(chosen, [~left for left in out])
+                point, _ = fit_seen(chosen, [~held_out for held_out in out])
             except np.linalg.LinAlgError:
                 continue
-            for i, left in enumerate(out):
-                if left.any():
+            for i, held_out in enumerate(out):
+                if held_out.any():
                     start = point.per_run[i]
-                    seen = _restarted(chosen.problem, point.common, start, i, simulate, native, seen=~left)
-                    before.append(plain[runs[i].id][left])
-                    fitted.append(caused[runs[i].id][left])
-                    engine.append(seen.residual[left])
+                    restart = _restarted(
+                        chosen.problem, point.common, start, i, simulate, native, seen=~held_out
+                    )
+                    before.append(plain[runs[i].id][held_out])
+                    fitted.append(caused[runs[i].id][held_out])
+                    engine.append(restart.residual[held_out])
     if not engine:
         raise TunnelError("no run with the wind off could be held out", remedy="add runs with the wind off")
     nominal_power, fit_power, native_power = (
-        float(np.mean(np.concatenate(left) ** 2)) for left in (before, fitted, engine)
+        float(np.mean(np.concatenate(residuals) ** 2)) for residuals in (before, fitted, engine)
     )
-    count = sum(left.size for left in before)
+    count = sum(residuals.size for residuals in before)
     p_value = float(chdtrc(count, count * nominal_power))
     on = ON_RUNS if held else ON_STRETCHES
     return NativeClosure(nominal_power, fit_power, native_power, on, p_value), restarts
@@ -114,12 +116,12 @@ def native_closure(
 
 @dataclass(frozen=True, eq=False)
 class Restart:
-    """A run whose start is refitted in the engine.
+    """A run with its start refitted in the engine.
 
     Args:
-        own: its own parameters, shape (own,).
-        residual: as `engine_residual`, shape (n,).
-        slopes: of the residual to the angle and the rate at the start, with the opposite sign, shape (n, 2).
+        own: the run's own parameters, shape (own,).
+        residual: as from `engine_residual`, shape (n,).
+        slopes: minus the derivatives of the residual by the angle and the rate at the start, shape (n, 2).
     """
 
     own: Array
@@ -144,22 +146,24 @@ def _restarted(
     """
     seen = np.ones(problem.data.runs[index].reading.size, bool) if seen is None else seen
 
-    def left(per_run: Array) -> Array:
+    def residual_at(per_run: Array) -> Array:
         return engine_residual(problem, common, per_run, index, simulate, native)
 
-    best = left(own)
-    # derivatives of the engine: its frequency may depend on the amplitude where the fit's does not
+    best = residual_at(own)
+    # derivatives in the engine: its frequency may depend on the amplitude, unlike the fit's
     if slopes is None:
         steps = _SHIFT * max(abs(float(own[0])), 1e-3) * np.array([1.0, 10.0])
-        moved = [(best - left(own + step * np.eye(own.size)[k])) / step for k, step in enumerate(steps)]
+        moved = [
+            (best - residual_at(own + step * np.eye(own.size)[k])) / step for k, step in enumerate(steps)
+        ]
         slopes = np.array(moved).T
     columns = slopes[seen]
-    for _ in range(_RELEASE_STEPS):  # the start moves too little to change them
+    for _ in range(_RELEASE_STEPS):  # the start changes too little to change the slopes
         move = np.linalg.lstsq(columns, best[seen], rcond=1e-10)[0]
         if np.sum((columns @ move) ** 2) <= _NO_DROP * np.sum(best[seen] ** 2):
             break
         trial = own + np.concatenate([move, np.zeros(own.size - 2)])
-        there = left(trial)
+        there = residual_at(trial)
         if not there[seen] @ there[seen] < best[seen] @ best[seen]:
             break
         own, best = trial, there
@@ -179,7 +183,7 @@ def engine_residual(
     Args:
         common: parameters of all runs, shape (common,).
         own: parameters of the run, shape (own,).
-        native: ids of the runs in which the model's actuator itself has the effects on the input.
+        native: ids of the runs in which the model's own actuator has the effects on the input.
 
     Returns:
         In noise standard deviations, shape (n,).
@@ -189,10 +193,10 @@ def engine_residual(
     blocks = run.reading.size + blocks_beyond(chain.physics(), run) + 1
     measured = change.own(blocks * run.interval, "s")
     start, given = _start(problem, own, index), (chain.stated if run.id in native else chain.physics()).drive
-    if given is not None:  # without the constant moment, which is written into the model
+    if given is not None:  # without the constant moment, which is already in the model
         acting = replace(given, offset=0.0).acting
         seconds, scale = change.own(1.0, "s"), change.own(given.scale, "N m")
-        lead = problem.data.model.lead  # the engine has its own
+        lead = problem.data.model.lead  # the engine has its own value
         times, delay = acting.time_s * seconds, (given.delay + lead) * seconds
         start = replace(start, drive=replace(acting, time_s=times, scale=scale, delay=delay))
     motion = simulate(common, start, measured)
@@ -209,13 +213,13 @@ def _start(problem: Problem, own: Array, index: int) -> Start:
 
 
 def controlled(campaign: Campaign, actuator: Actuator | None) -> frozenset[str]:
-    """Ids of the runs whose input is the control of the model's actuator; the others' is a moment on the joint."""
+    """Ids of the runs that control the model's actuator; the input of the other runs is a moment on the joint."""
     runs = campaign.driven_by("drive") if actuator is not None else ()
     return frozenset(run.id for run in runs)
 
 
 def refuse_unpatchable(model: JointModel, campaign: Campaign, path: Path) -> None:
-    """Refuse a model that no answer about a campaign could be written into, before the diagnosis.
+    """Refuse, before the diagnosis, a model into which no answer could be written.
 
     Raises:
         TunnelError: when every run has the wind on, or the engine cannot write or simulate the given model.
@@ -289,20 +293,20 @@ def _written_model(
     closure, restarts = native_closure(study.nominal, chosen, nominal_out, chosen_out, simulate, native)
     engine = compiled(chosen.point.common.tobytes())
     rest, slide = model.law.rest, model.law.slide
-    limits = (fact for one in identified.elements for fact in one.limits(engine, rest, slide=slide))
+    limits = (fact for per_run in identified.elements for fact in per_run.limits(engine, rest, slide=slide))
     differences = (*identified.differences, *limits)
     if given is not None and given.opt.integrator != int(mujoco.mjtIntegrator.mjINT_RK4):
         differences += (Fact("early steps", {"half_step_ms": 500.0 * given.opt.timestep}),)
     own = list(chosen.point.per_run)
     if given is not None:  # the engine's steps and its input do not begin as in the fit
         common = chosen.point.common
-        for i, one in enumerate(own):
+        for i, per_run in enumerate(own):
             held, slopes = restarts.get(i), None
             if held is not None:
-                one, slopes = np.concatenate([held.own[:2], one[2:]]), held.slopes
-            own[i] = _restarted(chosen.problem, common, one, i, simulate, native, slopes=slopes).own
+                per_run, slopes = np.concatenate([held.own[:2], per_run[2:]]), held.slopes
+            own[i] = _restarted(chosen.problem, common, per_run, i, simulate, native, slopes=slopes).own
     inputs = [run.moment(1.0) if run.id in runs else None for run in problem.data.runs]
-    starts = [replace(_start(problem, one, i), drive=inputs[i]) for i, one in enumerate(own)]
+    starts = [replace(_start(problem, per_run, i), drive=inputs[i]) for i, per_run in enumerate(own)]
     spec, written = patched(model, identified.elements, starts)
     zeros = [problem.zero(chosen.point.common, own) for own in chosen.point.per_run]
     zero = float(np.median(zeros)) + change.rest - model.law.rest

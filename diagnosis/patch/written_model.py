@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from tunnel_sim.engine.joint_model import JointModel
 
 LAW_LEAVES: Final = 0.001
-"""Share of the gap that the fit leaves, below which a law of friction under load is right, and a part of the
-causes that cannot be written into the user's model excuses the patched model. Judgement. Simulated joints: a
-right law leaves 0.0001, a wrong one 0.002 or more."""
+"""Unexplained share of the gap below which a law of friction under load counts as right; and below which a part
+of the causes that cannot be written into the user's model excuses the patched model. Judgement. In simulated
+joints a right law leaves 0.0001, a wrong one 0.002 or more."""
 
 
 @dataclass(frozen=True)
@@ -31,9 +31,9 @@ class NativeClosure:
 
     Args:
         before: mean squared residual of the nominal model, in units of a block mean's noise variance.
-        fit: of the fits' own integrator with the causes, in the same unit.
-        native: of the patched model, simulated by the engine, in the same unit.
-        p_value: of the residual of the nominal model, a probability.
+        fit: residual of the fits' own integrator with the causes, in the same unit.
+        native: residual of the patched model, simulated by the engine, in the same unit.
+        p_value: p-value of the residual of the nominal model.
     """
 
     before: float
@@ -65,8 +65,8 @@ class EngineModel:
 
     Args:
         given: the user's model.
-        spec: with the causes written into it.
-        closure: by simulations with it.
+        spec: the model with the causes written into it.
+        closure: share of the gap explained in simulations with it.
     """
 
     given: JointModel
@@ -88,12 +88,12 @@ class EngineModel:
 
 @dataclass(frozen=True)
 class NativeForm:
-    """The nearest model of MuJoCo's own elements.
+    """The nearest model of MuJoCo's own elements alone.
 
     Args:
-        written: attributes that changed.
+        written: changed attributes.
         closed: share of the gap on held-out readings that it explains, simulated by the engine.
-        engine: the model itself, which is not part of the JSON; None for one that was read from a file.
+        engine: the model itself, which is not part of the JSON; None if read from a file.
     """
 
     written: tuple[WrittenAttribute, ...]
@@ -105,7 +105,7 @@ class NativeForm:
         return _written(self.engine, path)
 
     def to_json_dict(self) -> dict[str, Any]:
-        """The fields but the engine's."""
+        """The fields except ``engine``."""
         return {"written": as_json(self.written), "closed": self.closed}
 
 
@@ -115,18 +115,18 @@ class PatchedModel:
 
     Args:
         file: name of the given model's file.
-        joint: that was recorded.
-        free: parameters of the nominal model that were fitted.
-        rest_rad: position of the joint about which the law is stated, rad.
+        joint: the recorded joint.
+        free: fitted parameters of the nominal model.
+        rest_rad: position of the joint from which the law measures angles, rad.
         zero_rad: the reading less the joint's position, rad; the median of the runs.
-        written: attributes that changed.
-        differences: where the native element follows another law, and causes left out.
+        written: changed attributes.
+        differences: differences between a native element and the law, and causes left out.
         closed: share of the gap on held-out readings that the model explains, simulated by the engine.
         closed_by_fit: share that the fit explains.
         closed_on: the held-out readings.
         notes: the differences in sentences; empty until they are written.
-        native: the nearest model of MuJoCo's own elements; None where this one has no others.
-        engine: the model itself, which is not part of the JSON; None for one that was read from a file.
+        native: the nearest model of MuJoCo's own elements alone; None where this model has no others.
+        engine: the model itself, which is not part of the JSON; None if read from a file.
     """
 
     file: str
@@ -173,21 +173,21 @@ class PatchedModel:
         )
 
     def judged(self, chosen: AnswerSettings) -> float | None:
-        """Share of the gap that the patched model explains, as a judgement on the causes.
+        """Share of the gap that the patched model explains, for judging the causes.
 
         Returns:
-            None where its runs do not show the gap; or where a part of the causes cannot be written into the
-            model, and the fit, which has that part, leaves next to nothing of the gap.
+            None where the runs do not show the gap. Also None if a part of the causes cannot be written into
+            the model, and the fit, which includes that part, leaves next to nothing of the gap.
         """
         kinds = {fact.kind for fact in self.differences}
         excused = kinds & _OMISSIONS and 1.0 - self.closed_by_fit < LAW_LEAVES
         return self.closed if self._shown(chosen) and not excused else None
 
     def under_load(self, chosen: AnswerSettings) -> float | None:
-        """Share of the gap that the fit leaves with friction that depends on the moment of an actuator.
+        """Unexplained share of the gap with friction that depends on the moment of an actuator.
 
         Returns:
-            None without such friction, or where the fit leaves next to nothing, as only a right law does. Friction
+            None without such friction, or if the fit leaves next to nothing, as only a right law does. Friction
             under the mean load explains most of a gap whatever the law is.
         """
         loaded = any(fact.figures.get("moment") == ON_ACTUATOR for fact in self.differences)
@@ -201,7 +201,8 @@ class PatchedModel:
     def write(self, path: Path | str) -> Path:
         """Write the patched model to an MJCF file, which it replaces, completely or not at all.
 
-        MuJoCo reads a model with the plugin, which has a ``native`` one beside it, after `tunnel_sim.load_plugin`.
+        After `tunnel_sim.load_plugin`, MuJoCo can read a model that uses the plugin; it has a ``native`` model
+        beside it.
 
         Raises:
             TunnelError: when it cannot be written, or the answer was read from a file.
@@ -209,7 +210,7 @@ class PatchedModel:
         return _written(self.engine, path)
 
     def to_json_dict(self) -> dict[str, Any]:
-        """The fields but the engine's."""
+        """The fields except ``engine``."""
         return {name: as_json(value) for name, value in vars(self).items() if name != "engine"}
 
 

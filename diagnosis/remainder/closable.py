@@ -17,9 +17,9 @@ class Curve:
 
     Args:
         over: the quantities: ``angle`` (rad), ``rate`` (rad/s) or ``time`` (s).
-        values: at all places, the last quantity running fastest, in ``unit``. A part in proportion to angle or
-            rate is removed, because it belongs to the model's own coefficients.
-        std: their standard deviations, in ``unit``.
+        values: values at all places, the last quantity varying fastest, in ``unit``. A part in proportion to
+            angle or rate is removed, because it belongs to the model's own coefficients.
+        std: standard deviations of the values, in ``unit``.
         unit: of values and standard deviations.
     """
 
@@ -36,11 +36,11 @@ class Line:
 
     Args:
         frequency_hz: Hz.
-        frequency_std_hz: its standard deviation, Hz.
+        frequency_std_hz: standard deviation of the frequency, Hz.
         amplitude: root mean square over the runs, in ``unit``.
-        amplitude_std: its standard deviation, in ``unit``.
-        unit: of the readings.
-        false_alarm_rate: of lines, a fraction of the campaigns without one.
+        amplitude_std: standard deviation of the amplitude, in ``unit``.
+        unit: unit of the readings.
+        false_alarm_rate: false-alarm rate of lines, a fraction of the campaigns without one.
     """
 
     frequency_hz: float
@@ -56,10 +56,10 @@ class Law:
     """A formula that explains the residual, fitted like any other effect.
 
     Args:
-        effect: table of an effects file that states it.
+        effect: the table of an effects file that states the formula.
         parameters: value and standard deviation by name, in the unit that the table states.
         closed: share of the residual that it explains, on held-out runs.
-        std: its standard deviation from the scatter of the runs, a share.
+        std: standard deviation of the share, from the scatter of the runs.
     """
 
     effect: Mapping[str, Any]
@@ -68,7 +68,7 @@ class Law:
     std: float
 
     def to_json_dict(self) -> dict[str, Any]:
-        """Fields by name; of the parameters ``value`` and ``std``."""
+        """Fields by name; each parameter as ``value`` and ``std``."""
         parameters = {name: {"value": value, "std": std} for name, (value, std) in self.parameters.items()}
         found: dict[str, Any] = as_json({**vars(self), "parameters": parameters})
         return found
@@ -86,11 +86,11 @@ class Closable:
     """The part of the answer's residual that could be explained.
 
     Args:
-        excess: of the answer in the fitted runs, in noise variances of a sample.
-        kind: the simplest that explains about as much as any, of `KINDS`.
+        excess: excess of the answer in the fitted runs, in noise variances of a sample.
+        kind: the simplest of `KINDS` that explains about as much as any other.
         words: the result in sentences; empty until they are written.
         events: places of a kind that differs from run to run: ``run``, its ``share``, ``from_s`` and ``to_s``.
-        curve: of that kind; None where it has none.
+        curve: the law of the kind; None where it has none.
         alike: other kinds that explain about as much, measured in the same way.
         next_most: greatest share of the other kinds, measured in the same way; None without others.
         line: of the kind ``line``; else None.

@@ -1,8 +1,8 @@
-"""The formula for the residual of driven runs: laws of a short list, each fitted like any effect.
+"""The formula for the residual of driven runs: laws of a short list, each fitted like an effect.
 
-Where dry friction stops a driven body, the moment missing at rest depends on the input, not on the measured path.
-The explainable share is therefore not bounded from linear responses, as for free decays; the laws are integrated
-with the motion instead.
+If dry friction stops a driven body, the moment missing at rest depends on the input, not on the measured path.
+Linear responses therefore give no bound on the explainable share, as they do for free decays. Instead, the laws
+are integrated with the motion.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ Time against coverage."""
 
 _OF_RATE = ("abs(r)*r", "r^3", "sign(r)")
 _OF_SLOW_RATE = ("exp(-(r/v)^2)*sign(r)", "tanh(r/v)")
-"""The rise of friction at low rates (Stribeck), and friction that is smooth about rest. Both are general forms of
-dry friction too, but an answer has one form, and friction that rises may also grow with the load."""
+"""Friction that rises at low rates (Stribeck), and friction that is smooth about rest. Both are also general
+forms of dry friction. But an answer has one form, and friction that rises may also grow with the load."""
 _OF_ANGLE = ("b^2", "b^3", "abs(b)*b")
 _OF_BOTH = ("b^2*r", "b*sign(r)", "abs(b)*sign(r)")
-_WIDTHS = (0.05, 0.2)  # of the greatest rate; a fit reaches the values between
-_FIRST = 0.01  # of the greatest restoring moment: where the fit of a coefficient starts
+_WIDTHS = (0.05, 0.2)  # shares of the greatest rate; a fit reaches the values between
+_FIRST = 0.01  # share of the greatest restoring moment: the starting value of a coefficient
 
 
 def closable_driven(study: Study, *, significant: bool) -> Closable | None:
-    """The law of a short list that predicts held-out data best; None where none does, or none is sought.
+    """The law of a short list that predicts held-out data best; None if no law does, or none is sought.
 
     Args:
         significant: whether the residual of the answer exceeds chance.
@@ -60,7 +60,7 @@ def closable_driven(study: Study, *, significant: bool) -> Closable | None:
     if not found:
         return None
     kind, best = min(found, key=lambda one: one[1].fit.total)
-    # One rate for all laws of the list together.
+    # all laws of the list share one false-alarm rate
     if base.total - best.fit.total < chdtri(1 + _own_numbers(best), settings.term_rate / len(laws)):
         return None
     closed, std, held_out = held_out_share(base, best.fit)
@@ -85,14 +85,14 @@ def _own_numbers(proposal: Proposal) -> int:
 
 
 def _formulas(base: Fit) -> Iterator[tuple[str, Formula]]:
-    """The laws to be tried, with the kind of each; their first coefficients are small."""
+    """The laws to be tried, with the kind of each; their initial coefficients are small."""
     motions = paths(base)
     r = ranges(motions)
     moment = _FIRST * r.angle * r.stiffness
     delta = np.zeros(base.point.common.size)
     for kind, term in _terms(r):
         at = {"b": r.angle, "r": r.rate}
-        # The laws do not all have their maxima at the ends of the motion.
+        # the laws have their maxima at different points of the motion
         inside = [
             float(np.max(np.abs(term.value({k: s * v for k, v in at.items()})))) for s in (0.05, 0.3, 1.0)
         ]

@@ -26,13 +26,13 @@ from tunnel_sim.vocabulary.quantities import Hertz
 from tunnel_sim.vocabulary.record import Array
 
 CLOSABLE_FROM: Final = 0.1
-"""Minimum share of the residual explained by some law to be more than noise. Judgement."""
+"""Minimum share of the residual that a law must explain for the residual to be more than noise. Judgement."""
 COMMON_FIRST: Final = 0.8
-"""Share of a law of all runs, relative to laws of single runs, above which it is preferred. Judgement."""
+"""Share of a common law, relative to laws of single runs, above which the common law is preferred. Judgement."""
 CLOSES_ALIKE: Final = 0.02
-"""Maximum shortfall of a simpler law for it to be preferred. Judgement."""
+"""Maximum difference in share to a better law for a simpler law to be preferred. Judgement."""
 NAMED_ALIKE: Final = 0.02
-"""Maximum shortfall of a law to be called indistinguishable. Judgement."""
+"""Maximum difference in share to the best law for a law to be called indistinguishable. Judgement."""
 EVENTS_FROM: Final = 0.1
 """Minimum part of a run to be listed as an event, as a share of the largest part. Judgement."""
 EVENT_SHARE: Final = 0.8
@@ -44,21 +44,21 @@ STEADY_LINE_HALVES: Final = 0.8
 """Minimum share of a line in one half of a run that the other half must predict. Judgement."""
 
 Events = tuple[Mapping[str, Any], ...]
-"""By run, the largest part first: ``run``, its ``share`` of the explained part, and ``from_s`` and ``to_s`` since
-the start of the record."""
+"""By run, the largest part first: ``run``, its ``share`` of the explained part, and the times ``from_s`` and
+``to_s`` since the start of the record."""
 
 
 def closable(study: Study, *, significant: bool, decided: bool = True) -> Closable | None:
     """Find the share of an answer's residual that could be explained, and the law for it.
 
     Args:
-        decided: whether the answer is decided; if not, the residual is the whole gap of the nominal model, beyond
-            chance differences between the runs under the likeliest answer.
+        decided: whether the answer is decided; if not, the residual is the whole gap of the nominal model, less
+            chance differences between the runs under the most likely answer.
         significant: whether the residual exceeds chance.
 
     Returns:
-        In the measured campaign's units; None where the residual is within chance or too small for a share, or a
-        random moment is part of the answer, since it could explain anything.
+        In the measured campaign's units. None where the residual is within chance or too small for a share, or
+        if the answer includes a random moment, which could explain anything.
 
     Raises:
         LinAlgError: when the equations of a kind cannot be solved.
@@ -82,20 +82,21 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
     if kind is None:
         return None
     law, shape = None, None
-    found: Events = ()
+    largest: Events = ()
     if kind in common:
         shape = curve(unexplained, common[kind], similarity)
         law = _law(unexplained, kind, common[kind].drop, similarity)
-        # few runs may show angle and rate as a function of one of them: the formula corrects that
+        # few runs may make a function of angle and rate look like a function of one of them: the formula
+        # corrects that
         formula = "" if law is None else str(law.effect.get("moment", ""))
         other = {"angle": "r", "rate": "b"}.get(kind)
         kind = "state" if other and re.search(rf"\b{other}\b", formula) else kind
     elif line is not None and kind == "line":
-        found = line.events
+        largest = line.events
     elif kind in single:
-        found = events(unexplained, kind, single[kind].precision)
+        largest = events(unexplained, kind, single[kind].precision)
     where = tuple(
-        {**one, **{end: similarity.own(one[end], "s") for end in ("from_s", "to_s")}} for one in found
+        {**one, **{end: similarity.own(one[end], "s") for end in ("from_s", "to_s")}} for one in largest
     )
     ceilings = tuple(one.ceiling for one in (*common.values(), *single.values()))
     alike, next_most = _others(kind, ceilings)
@@ -115,7 +116,7 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
 def chosen_kind(common: Mapping[str, Evidence], single: Mapping[str, Evidence]) -> str | None:
     """The simplest kind of `KINDS` that explains about as much as any; simpler common laws come first.
 
-    None where only kinds of undetermined shares could explain more than a small share.
+    None if only kinds with undetermined shares could explain more than a small share.
     """
     of_all, of_one = (
         {kind: one.ceiling for kind, one in kinds.items() if one.ceiling.determined()}
@@ -133,7 +134,7 @@ def chosen_kind(common: Mapping[str, Evidence], single: Mapping[str, Evidence]) 
 
 
 def _law(unexplained: Unexplained, kind: str, drop: float, similarity: Similarity) -> Law | None:
-    """The formula of a kind in the measured campaign's units, where held-out data support one."""
+    """The formula of a kind in the measured campaign's units, if held-out data support one."""
     formula = choose(unexplained, kind, drop)
     proposal = None if formula is None else propose(unexplained.fit, formula, kind)
     if proposal is None:
@@ -143,22 +144,22 @@ def _law(unexplained: Unexplained, kind: str, drop: float, similarity: Similarit
 
 
 def _others(kind: str, ceilings: tuple[Ceiling, ...]) -> tuple[tuple[str, ...], float | None]:
-    """The kinds that explain about as much as the chosen one, and the greatest share of the others.
+    """The other kinds that explain about as much as the chosen one, and the greatest share of the rest.
 
-    Only those others count that do not include the chosen one as a case, and that are measured in the same way.
+    A kind counts only if the chosen kind is not a special case of it, and if it is measured in the same way.
     """
-    best = next((one for one in ceilings if one.kind == kind), None)
+    best = next((ceiling for ceiling in ceilings if ceiling.kind == kind), None)
     if best is None:
         return (), None
     included = (kind, "state") if kind in ("angle", "rate") else (kind,)
     others = [
-        one
-        for one in ceilings
-        if one.determined() and one.held_out == best.held_out and one.kind not in included
+        ceiling
+        for ceiling in ceilings
+        if ceiling.determined() and ceiling.held_out == best.held_out and ceiling.kind not in included
     ]
     least = best.closed - max(NAMED_ALIKE, best.std)
-    alike = tuple(one.kind for one in others if one.closed >= least)
-    return alike, max((one.closed for one in others), default=None)
+    alike = tuple(ceiling.kind for ceiling in others if ceiling.closed >= least)
+    return alike, max((ceiling.closed for ceiling in others), default=None)
 
 
 def _own_line(line: SteadyLine, similarity: Similarity, chosen: RemainderSettings) -> Line:
@@ -185,8 +186,9 @@ _OVER: Mapping[str, tuple[str, ...]] = {
 def curve(unexplained: Unexplained, evidence: Evidence, similarity: Similarity) -> Curve | None:
     """The law of a kind without a formula, in the measured campaign's units; None where it has no common law.
 
-    It is for the median spring, and for the greatest wind speed if it is of the wind; a moment in time is that at
-    the greatest angle, without rate. The part absorbed by the model's own coefficients and its zero is removed.
+    It is given for the median spring, and a law of the wind for the greatest wind speed; a moment in time is
+    given at the greatest angle, without rate. The part absorbed by the model's own coefficients and its zero is
+    removed.
     """
     kind = evidence.ceiling.kind
     if evidence.solution is None or kind not in _OVER:
@@ -234,7 +236,7 @@ def events(unexplained: Unexplained, kind: str, precision: float) -> Events:
         precision: one over the variance of a coefficient in the prior, in the basis' units.
 
     Returns:
-        The times between which most of a run's part occurs.
+        The times that contain most of a run's part.
     """
     drops, spans = [], []
     for unit, columns in zip(unexplained.runs, unexplained.columns(kind), strict=True):
@@ -265,9 +267,9 @@ def _listed(
     )
 
 
-_AROUND = 61  # frequencies whose median is the floor beside a line
+_AROUND = 61  # number of frequencies for the median that is the floor beside a line
 _MEDIAN = 2.0 * np.log(2.0)  # of χ² with two degrees of freedom
-_NYQUIST = 0.45  # of the sample rate: lines above may be images
+_NYQUIST = 0.45  # share of the sample rate: lines above may be images
 
 
 @dataclass(frozen=True)
@@ -275,9 +277,9 @@ class SteadyLine:
     """A prominent line in the residuals of all runs together, in the units of the fit.
 
     Args:
-        frequency_std: its standard deviation, Hz.
+        frequency_std: standard deviation of the frequency, Hz.
         amplitude: in the unit of the reading, root mean square over the runs.
-        amplitude_std: its standard deviation, in the same unit.
+        amplitude_std: standard deviation of the amplitude, in the same unit.
         events: the runs that show it, over their whole duration.
     """
 
@@ -292,18 +294,18 @@ class SteadyLine:
 def steady_line(unexplained: Unexplained) -> SteadyLine | None:
     """The strongest line at one frequency in a fit's residual, away from the motion and its harmonics.
 
-    None where chance may explain it, at one joint rate for all frequencies, where it is the skirt of a broader
-    feature, or where it does not keep its phase in a run.
+    None where chance may explain the line, at one joint rate for all frequencies, where it is the skirt of a
+    broader feature, or where its phase changes within a run.
     """
     start, floor = _strongest(unexplained)
     if start is None:
         return None
     runs = [path.run for path in unexplained.paths]
     width = 1.0 / max(run.duration for run in runs)
-    found = minimize_scalar(
+    minimum = minimize_scalar(
         lambda f: -_drops(unexplained, f).sum(), bounds=(start - width, start + width), method="bounded"
     )
-    frequency = float(found.x)
+    frequency = float(minimum.x)
     # Share of the line in one half of a run that the other half predicts: 1 at constant phase and amplitude.
     # Chance lowers the prediction by 2 in every half, and raises the fit.
     predicted, fitted = 0.0, 0.0
@@ -324,10 +326,10 @@ def steady_line(unexplained: Unexplained) -> SteadyLine | None:
     frequency_std = float(np.sqrt(12.0 * floor / sharpness) / (2.0 * np.pi))
     noise = np.array([float(run.noise_at(frequency) / block_gain(frequency, run)) for run in runs])
     sizes = np.array([run.reading.size for run in runs])
-    squares = 2.0 * np.maximum(drops - 2.0, 0.0) / sizes * noise**2  # two of the drop are chance
+    squares = 2.0 * np.maximum(drops - 2.0, 0.0) / sizes * noise**2  # chance adds two to the drop
     amplitude = float(np.sqrt(np.mean(squares)))
     # short gaps are predicted from the line around them, as for every kind that differs from run to run
-    closed, left = [], []
+    closed, excesses = [], []
     for path in unexplained.paths:
         waves, residual = _waves(path, frequency)
         turn, after = gaps(residual.size, path.group), 0.0
@@ -336,8 +338,8 @@ def steady_line(unexplained: Unexplained) -> SteadyLine | None:
             after += float(np.sum((residual[out] - waves[out] @ size) ** 2))
         power = float(residual @ residual)
         closed.append(power - after)
-        left.append(power - residual.size)
-    ceiling = Ceiling("line", *ratio(np.array(closed), np.array(left)), GAPS)
+        excesses.append(power - residual.size)
+    ceiling = Ceiling("line", *ratio(np.array(closed), np.array(excesses)), GAPS)
     times = [path.time + path.run.start for path in unexplained.paths]
     spans = [(float(time[0]), float(time[-1])) for time in times]
     return SteadyLine(
@@ -351,8 +353,8 @@ def steady_line(unexplained: Unexplained) -> SteadyLine | None:
 
 
 def _strongest(unexplained: Unexplained) -> tuple[float | None, float]:
-    """Frequency of the least likely line, Hz, and the power beside it over the noise's."""
-    from scipy.ndimage import median_filter  # only here: slow to load
+    """Frequency of the most significant line, Hz, and the power beside it over the noise's."""
+    from scipy.ndimage import median_filter  # imported here because it is slow to load
 
     spectra = smooth_spectra(unexplained.fit)
     longest = max(spectra, key=lambda one: one.duration)

@@ -33,13 +33,12 @@ from tunnel_sim.vocabulary.record import Array
 TERM_GAIN: Final = 0.02
 """Minimum part of the explainable share that a further term must add. Judgement."""
 FORMULA_OPEN: Final = 0.02
-"""Maximum part of the explainable share that a complete formula may miss. Judgement."""
+"""Maximum missing part of the explainable share for a formula to count as complete. Judgement."""
 WIDER_OPEN: Final = 0.02
-"""Part of the explainable share missed by a formula of angle or rate above which a formula of both is tried.
-Judgement."""
+"""Missing part of the explainable share above which, for a formula of angle or rate, a formula of both is
+tried. Judgement."""
 FIRST_START: Final = 0.02
-"""Maximum unexplained share of the excess at which a fitted formula needs no other starting point.
-Judgement."""
+"""Maximum unexplained share of the excess for a fitted formula to need no other starting point. Judgement."""
 MOST_TERMS: Final = 3
 """Maximum number of terms in a formula. Judgement."""
 
@@ -55,7 +54,7 @@ class FormulaTerm:
     """A term with the values of its inner parameters.
 
     Args:
-        text: of ``b``, ``r``, ``t``, ``V``, ``Kr``, ``omega`` or ``y``, and its inner parameters.
+        text: expression in ``b``, ``r``, ``t``, ``V``, ``Kr``, ``omega`` or ``y``, and inner parameters.
         inner: value of each inner parameter, in the unit of `_INNER`.
     """
 
@@ -99,8 +98,8 @@ _READING_PLACE = ("max(abs(y)-c,0)*sign(y)", "max(y-c,0)", "max(-y-c,0)")
 def terms(kind: str, r: Ranges) -> list[FormulaTerm]:
     """The terms that may explain a kind of `KINDS`, without a factor for spring or wind.
 
-    Their inner parameters are spaced closely enough for a fit to reach the values between. There are no terms for
-    kinds that no formula explains.
+    The values of their inner parameters are spaced closely enough for a fit to reach the values between. No
+    terms are returned for kinds that no formula explains.
     """
     library: list[FormulaTerm] = []
     if kind in ("angle", "state", "wind"):
@@ -150,9 +149,9 @@ def _places(r: Ranges) -> Array:
     return np.linspace(0.08, 0.92, 15) * r.angle
 
 
-_TRIED = 10  # terms of the greatest drop of χ² that are tried on held-out runs
-_FAR = 1e3  # bounds of a coefficient, in its first value
-_NEAR = 4.0  # bounds of a width or place, in its first value
+_TRIED = 10  # number of terms with the greatest drop of χ² that are tried on held-out runs
+_FAR = 1e3  # bounds of a coefficient, as multiples of its first value
+_NEAR = 4.0  # bounds of a width or place, as multiples of its first value
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +159,7 @@ class Formula:
     """A sum of terms with coefficients.
 
     Args:
-        coefficients: of each, in N m, or rad for a reading, over the term's own unit.
+        coefficients: coefficient of each term, in N m, or rad for a reading, over the term's own unit.
         delta: accompanying steps of the fit's common parameters, in their units, shape (common,).
         gained: drop of χ² on held-out runs, dimensionless.
     """
@@ -177,7 +176,7 @@ class Proposal:
     """A formula as an effect, fitted.
 
     Args:
-        table: of an effects file, in the units of the fit.
+        table: table of an effects file, in the units of the fit.
     """
 
     table: dict[str, Any]
@@ -191,7 +190,7 @@ def choose(unexplained: Unexplained, kind: str, closable: float) -> Formula | No
         closable: drop of χ² on held-out runs with the kind's own basis.
 
     Returns:
-        The formula; None where no term is supported beyond chance, or it does not predict held-out runs.
+        The formula; None if no term is supported beyond chance, or the formula does not predict held-out runs.
     """
     found = _chosen(unexplained, kind, closable)
     if kind in ("angle", "rate") and (found is None or found.gained < (1.0 - WIDER_OPEN) * closable):
@@ -232,10 +231,10 @@ def _chosen(unexplained: Unexplained, kind: str, closable: float) -> Formula | N
 
 
 def _candidates(unexplained: Unexplained, kind: str) -> list[FormulaTerm]:
-    """The terms available for a formula of a kind; none where the runs allow none."""
+    """The terms available for a formula of a kind; none if the runs allow none."""
     of_reading = kind == "reading"
     if of_reading and unexplained.paths[0].run.derivative:
-        return []  # an effect's reading is an angle
+        return []  # the reading of an effect is an angle
     found = terms(kind, unexplained.ranges)
     if kind == "wind":
         fast = [FormulaTerm("V*" + term.text, term.inner) for term in found if "r" in term.formula.names]
@@ -246,7 +245,7 @@ def _candidates(unexplained: Unexplained, kind: str) -> list[FormulaTerm]:
 
 
 def _paying(unexplained: Unexplained, parts: Sequence[Normal], closable: float) -> tuple[list[int], float]:
-    """The terms, added as long as each pays on held-out runs, and the drop of χ² there.
+    """The terms, added as long as each lowers χ² on held-out runs, and the drop of χ² there.
 
     Args:
         parts: normal equations of all terms, by unit.
@@ -269,7 +268,7 @@ def _paying(unexplained: Unexplained, parts: Sequence[Normal], closable: float) 
         solved = np.linalg.pinv(inner / np.outer(width, width), rcond=1e-11, hermitian=True) @ cross
         left = power - np.sum(cross * solved, axis=0)
         along = whole.gradient[c:] - solved.T @ (whole.gradient[known] / width)
-        # a term that the others explain to within rounding gains nothing
+        # a term that the others explain up to rounding gains nothing
         drops = np.where(left > 1e-6 * np.maximum(power, 1e-300), along**2 / np.maximum(left, 1e-300), 0.0)
         order = [int(i) for i in np.argsort(-drops)[:_TRIED] if drops[i] > threshold]
         tried = []
@@ -291,7 +290,7 @@ def _of(whole: Normal, chosen: Sequence[int]) -> Normal:
 
 
 def propose(base: Fit, formula: Formula, kind: str) -> Proposal | None:
-    """Fit a formula beside a fit's effects like any other, named after the kind; None where the fit fails."""
+    """Fit a formula beside a fit's effects, like an effect named after the kind; None where the fit fails."""
     stated = _stated(base, formula, kind)
     if stated is None:
         return None
@@ -309,14 +308,14 @@ def propose(base: Fit, formula: Formula, kind: str) -> Proposal | None:
 
 
 def predicted_drop(base: Fit, formula: Formula, kind: str) -> float:
-    """Drop of χ² that linear theory predicts for a formula beside a fit's effects; 0 where none is predicted."""
+    """Drop of χ² by a formula beside a fit's effects, by linear theory; 0 if none is predicted."""
     stated = _stated(base, formula, kind)
     starts = [] if stated is None else starting_points(base, stated[1].effects[-1])
     return max((start.predicted_drop for start in starts), default=0.0)
 
 
 def _stated(base: Fit, formula: Formula, kind: str) -> tuple[dict[str, Any], Problem, Point] | None:
-    """A formula's table, its problem beside a fit's effects, and the start there; None where it is no effect."""
+    """The table of a formula, its problem beside a fit's effects, and the start; None if it is not an effect."""
     taken, freedom = {known.name for known in known_effects()}, base.problem.data.freedom
     first = f"proposed_{freedom.words(kind)}"
     numbered = (f"{first}_{number}" for number in range(2, len(taken) + 3))

@@ -18,7 +18,7 @@ FORMULA_CLOSES: Final = 0.1
 
 
 def held_out_share(base: Fit, wider: Fit) -> tuple[float, float, str]:
-    """The share of a fit's residual that a wider fit explains on held-out data, its deviation, and the data."""
+    """Share of a fit's residual that a wider fit explains on held-out data, its deviation, and the data."""
     before, after = (predict_held_out(one).residuals for one in (base, wider))
     held_out = "runs" if before else "stretches of time"
     if not before:
@@ -32,11 +32,11 @@ def held_out_share(base: Fit, wider: Fit) -> tuple[float, float, str]:
 
 
 def stated_law(proposal: Proposal, similarity: Similarity, closed: float, std: float) -> Law | None:
-    """The law of a proposal in the measured campaign's units; None where its share of held-out data is small.
+    """The law of a proposal in the measured campaign's units; None if its share of held-out data is small.
 
     Args:
-        closed: its share of held-out data.
-        std: its standard deviation, a share.
+        closed: share of held-out data that the law explains.
+        std: standard deviation of the share.
     """
     if closed < FORMULA_CLOSES:
         return None

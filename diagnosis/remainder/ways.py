@@ -14,7 +14,7 @@ from diagnosis.search.study import Study
 class Way:
     """A way to find laws of an answer's residual."""
 
-    #: Key of the caution where nothing is sought; empty: none.
+    #: Key of the caution if nothing is sought; empty: none.
     caution: ClassVar[str] = ""
 
     def takes(self, study: Study) -> bool:
@@ -22,14 +22,14 @@ class Way:
         raise NotImplementedError
 
     def closable(self, study: Study, *, significant: bool, decided: bool) -> Closable | None:
-        """The explainable part of the answer's residual; None where nothing is sought or found.
+        """The explainable part of the answer's residual; None if nothing is sought or found.
 
         Args:
             significant: whether the residual exceeds chance; for an undecided answer it is the whole gap.
             decided: whether the answer is decided.
 
         Raises:
-            LinAlgError: when its equations cannot be solved.
+            LinAlgError: when the equations of the way cannot be solved.
         """
         raise NotImplementedError
 
@@ -44,7 +44,7 @@ class NotSought(Way):
         return study.campaign.driven and not study.model.restored
 
     def closable(self, study: Study, *, significant: bool, decided: bool) -> Closable | None:
-        """Nothing."""
+        """None: nothing is sought."""
         del study, significant, decided
         return None
 

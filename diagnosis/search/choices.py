@@ -1,7 +1,8 @@
-"""Discrete choices that the runs cannot make: which of the springs is not as stiff as stated.
+"""Discrete choices that the runs cannot make: which spring is not as stiff as stated.
 
-The inertia is fitted, so one spring too stiff and another too soft change the frequencies alike. The coefficients
-differ by far more than their standard deviations, so an answer with one choice is one of several.
+The inertia is fitted, so one spring that is too stiff and another that is too soft change the frequencies
+alike. The coefficients of the two fits differ by far more than their standard deviations, so an answer with one
+choice is one of several.
 """
 
 from __future__ import annotations
@@ -40,11 +41,11 @@ def choices(chosen: Hypothesis, gap: ChannelMisfit) -> tuple[Choice, ...]:
     """The choices of a set of effects that the runs cannot exclude, the likeliest first.
 
     Args:
-        chosen: a fitted set, with the choice that fits best.
+        chosen: a fitted set, with the best-fitting choice.
         gap: misfit of the nominal model.
 
     Returns:
-        The choices probable enough to be stated, weighed like sets of effects; empty where there is at most one.
+        The choices probable enough to be stated, weighed like sets of effects; empty for fewer than two.
     """
     others = [
         other
@@ -70,7 +71,7 @@ def choices(chosen: Hypothesis, gap: ChannelMisfit) -> tuple[Choice, ...]:
 
 
 def _other_springs(chosen: Hypothesis, kind: type[Effect], name: str) -> Sequence[Hypothesis]:
-    """The set with another spring in place of the chosen one, fitted; sets whose fit fails are omitted."""
+    """The set with another spring in place of the chosen one, fitted; a set is omitted if its fit fails."""
     whole, found = chosen.fit, []
     problem, severity = whole.problem, f"{kind.name}.{kind.parameters()[0].name}"
     stated = dict(problem.fixed)[name]
@@ -86,11 +87,11 @@ def _other_springs(chosen: Hypothesis, kind: type[Effect], name: str) -> Sequenc
 
 
 def _exchanged(whole: Fit, severity: str) -> Point:
-    """The point with another spring off: with two springs the motion is the same, so no fit loses its phase.
+    """The point with another spring off: with two springs the motion is the same, so the fit keeps its phase.
 
     A spring (1 + x) times as stiff as stated, with all moments divided by 1 + x, has its stated stiffness, and the
-    other spring is then 1/(1 + x) times as stiff as stated. Inertia, damping and moments of effects are fitted, as
-    are the coefficients of the air, whose pressure is stated.
+    other spring is then 1/(1 + x) times as stiff as stated. Inertia, damping, moments of effects and the
+    coefficients of the air are fitted; the air's pressure is stated.
     """
     problem, factor = whole.problem, 1.0 / (1.0 + whole.value(severity))
     scaled, air = Similarity(moment=factor), problem.data.model.coefficient_units

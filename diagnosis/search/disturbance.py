@@ -7,17 +7,17 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Disturbance:
-    """A run whose motion jumps at an instant at which no other run's does, or that differs as a whole.
+    """A run that differs as a whole, or jumps at an instant at which no other run does.
 
     Args:
         run: id of the run.
         at_s: the instant, by the clock of the run's file, s; None where the run differs as a whole.
-        kept_until_s: end of the part that is used, by the same clock, s; None where the run is left out, or used
-            as a whole or from ``kept_from_s`` on.
-        p_value: probability of as large a jump among all runs and instants, or of as large a misfit to the model of
-            the others, by chance and by causes that act in all runs, a fraction.
-        used: whether the run is used as a whole, since the other runs do not determine the model.
-        kept_from_s: start of the part that is used, by the same clock, s; None: the start of the run.
+        kept_until_s: end of the used part, by the same clock, s; None where the run is left out, used as a
+            whole, or used from ``kept_from_s`` on.
+        p_value: probability of as large a jump among all runs and instants, or of as large a misfit to the
+            model of the other runs, by chance and by causes that act in all runs, a fraction.
+        used: whether the run is used as a whole, because the other runs do not determine the model.
+        kept_from_s: start of the used part, by the same clock, s; None: the start of the run.
     """
 
     run: str

@@ -22,11 +22,11 @@ lower χ² by more than 20 by chance once in 22,000 effects tried."""
 
 
 def evident(top: Hypothesis, kinds: Sequence[type[Effect]]) -> list[Hypothesis]:
-    """The set with one more effect that is evident beside the random moment, the most evident first.
+    """The set with one more effect that is evident beside the random moment; the most evident first.
 
-    The noise is estimated from the residuals, and no real spectrum has its form, so the scatter between the runs
-    shows how much of a drop of χ² is chance. An effect with an instant in every run must lower χ² for each instant
-    as well.
+    The noise is estimated from the residuals, and the real spectrum differs from the model's. The scatter
+    between the runs therefore shows how much of a drop of χ² is chance. An effect with an instant in every run
+    must lower χ² for each instant as well.
     """
     if len(top.effects) >= MOST_CAUSES:
         return []
@@ -38,13 +38,13 @@ def evident(top: Hypothesis, kinds: Sequence[type[Effect]]) -> list[Hypothesis]:
 
 
 def _gain(larger: Hypothesis, kind: type[Effect], without: Fit) -> float:
-    """Drop of χ² by an effect for each of its numbers, over what chance multiplies it by."""
+    """Drop of χ² by an effect per parameter, divided by its overdispersion."""
     drop = without.total - larger.fit.total
     return drop / overdispersion(larger.fit, kind) / _numbers(larger.fit, kind)
 
 
 def _numbers(fitted: Fit, kind: type[Effect]) -> int:
-    """Numbers of an effect that chance may fit: its severity, and the instants and phases of every run."""
+    """Number of an effect's parameters that chance may fit: its severity, and every run's instants and phases."""
     problem = fitted.problem
     return 1 + len(kind.per_run_parameters(problem.instants)) * len(problem.data.runs)
 
@@ -52,7 +52,7 @@ def _numbers(fitted: Fit, kind: type[Effect]) -> int:
 def needed(top: Hypothesis) -> Hypothesis:
     """The set without effects that are not evident beside the random moment.
 
-    An effect with a phase in every run, as vortices have, may gain weight by them without being evident.
+    Phases in every run, as vortices have, may add weight to an effect that is not evident.
     """
     known = top.fit
     for kind in known.problem.effects:
@@ -69,11 +69,11 @@ def needed(top: Hypothesis) -> Hypothesis:
 
 
 def overdispersion(fitted: Fit, kind: type[Effect]) -> float:
-    """Variance of an effect's parameters over its value in independent noise, 1 or more.
+    """Factor by which the variance of an effect's parameters exceeds its value in independent noise, 1 or more.
 
     Returns:
-        From the scatter of the runs' gradients, whose sum is zero (the sandwich covariance with the runs
-        as clusters; Liang and Zeger, Biometrika 73 (1986) 13), the mean over the parameters.
+        The mean over the parameters, from the scatter of the runs' gradients, which sum to zero (the sandwich
+        covariance with the runs as clusters; Liang and Zeger, Biometrika 73 (1986) 13).
     """
     matrices, gradients, _ = by_run(fitted.jacobian, fitted.residuals, products=fitted.products)
     own = [i for i, name in enumerate(fitted.problem.names) if name.split(".")[0] == kind.name]

@@ -13,8 +13,8 @@ from diagnosis.search.runs_in_view import RunsInView
 from diagnosis.search.scatter import likelier
 
 GROWTH_LOSS: Final = 2.8
-"""Maximum loss in the logarithm of the weight by an added effect for the set to be extended further.
-Judgement. A superfluous effect costs more. One of two equal causes explains only half."""
+"""Maximum loss in the logarithm of the weight by an added effect for the set to be extended further. Judgement.
+A superfluous effect costs more. One of two equal causes explains only half."""
 MOST_CAUSES: Final = 5
 """Maximum number of named causes, in effects. Convention. One to four causes of the vocabulary, and a small
 one."""
@@ -22,7 +22,7 @@ one."""
 
 @dataclass(frozen=True, eq=False)
 class GrownLevel:
-    """What has been grown up to a size.
+    """The sets grown up to a size.
 
     Args:
         found: all fitted sets, best first.
@@ -37,15 +37,15 @@ def levels(view: RunsInView, progress: Progress | None = None) -> Iterator[Grown
     """Add effects one at a time to the best few sets of each size, in a view of the runs.
 
     Args:
-        progress: called with the names of each set that is tried.
+        progress: called with the names of each set before it is tried.
 
     Yields:
-        The sets of each size, the smallest first. Growth ends where the evidence for a larger set falls or cannot
-        rise, and at the greatest number of causes; whoever asks may end it earlier.
+        The sets of each size, the smallest first. Growth ends where the evidence for a larger set falls or
+        cannot rise, and at the maximum number of causes; the caller may end it earlier.
     """
     first, gap = view.smallest, view.gap
     level = [first]
-    # that the runs differ by chance alone is an answer too
+    # a set of chance differences between runs alone is an answer, too
     found = {first.names: first} if first.effects or first.fit.problem.scatter else {}
     while level:
         yield _grown(found, level)
@@ -72,12 +72,12 @@ def going_on(
     *,
     in_pairs: bool = False,
 ) -> list[Hypothesis]:
-    """The sets to grow further from their parents, best first; empty where the best could gain nothing.
+    """The sets to grow further from their parents, best first; empty if not even the best could gain weight.
 
     Args:
         gap: misfit of the nominal model.
-        in_pairs: whether all effects that only the comparison of runs shows go on: beside the differences that one
-            of two patterns leaves, the other looks like chance as well.
+        in_pairs: whether to extend all effects that only the comparison of runs shows. Of two patterns between
+            the runs, one alone leaves differences that make the other look like chance.
     """
     settings = parents[0].fit.settings
     scale = Scale.of((*children, *parents), gap, settings.weighing)
@@ -85,14 +85,15 @@ def going_on(
     if not ranked or not _may_gain(ranked[0], scale):
         return []
     best = max((*ranked, *parents), key=scale.weight)
-    if best.explains_runs:  # only differences between runs remain, which further effects may explain
+    if best.explains_runs:  # only differences between runs remain, and further effects may explain them
         known = max(parent.fit.shown_between_runs for parent in parents)
         patterns = [child for child in ranked if in_pairs and child.fit.shown_between_runs > known]
-        # not by weight: a scatter that is as wide as before hides it
+        # not by weight: if the scatter is as wide as before, it hides the gain
         patterns.sort(key=lambda child: child.fit.unlikelihood)
         return patterns or [child for child in ranked if child is best]
     going = []
-    for child in ranked:  # may still improve on its best parent: one of two equal causes explains half
+    # the set may still improve on its best parent: one of two equal causes explains half
+    for child in ranked:
         smaller = [h for h in parents if set(h.effects) < set(child.effects)]
         first = not any(parent.effects for parent in smaller)
         if first or scale.weight(child) > max(map(scale.weight, smaller)) - GROWTH_LOSS:
@@ -101,7 +102,7 @@ def going_on(
 
 
 def _may_gain(hypothesis: Hypothesis, scale: Scale) -> bool:
-    """Whether the weight could rise if one more effect left no residual."""
+    """Whether the weight could rise if one more effect removed the whole residual."""
     if not hypothesis.effects:
         return True
     rises = scale.greatest(hypothesis) > scale.weight(hypothesis)
@@ -109,7 +110,7 @@ def _may_gain(hypothesis: Hypothesis, scale: Scale) -> bool:
 
 
 def _likeliest(children: Sequence[Hypothesis], gap: ChannelMisfit, view: RunsInView) -> list[Hypothesis]:
-    """The sets; the best are also fitted to runs that repeat exactly."""
+    """The sets, with the best also fitted to runs that repeat exactly."""
     if not view.base.problem.scatter:
         return list(children)
     scale = Scale.of((*children, view.smallest), gap, view.base.settings.weighing)

@@ -23,9 +23,9 @@ from tunnel_sim.effects.capabilities import OwnNumbers
 from tunnel_sim.vocabulary.record import Array
 
 NEEDLESS_SPRING: Final = 0.05
-"""Maximum stiffness of an unstated spring, as a share of its stiffness with gravity, at which the rig has no
-spring. Judgement (decision 0018). The set then counts two parameters less: a spring would have to soften by
-chance exactly as much as gravity does."""
+"""Maximum stiffness of an unstated spring, as a share of its stiffness with gravity, for the rig to have no
+spring. Judgement (decision 0018). The set then counts two parameters less: otherwise the spring would have to
+soften by chance exactly as much as gravity does."""
 
 FORM_NEEDED: Final = 0.2
 """Minimum rise of χ² without a freed form, as a share of the excess, for the form to be kept. Tuned (decision
@@ -34,17 +34,17 @@ FREED_HYPOTHESES: Final = 3
 """Number of sets of one effect whose forms are freed. Judgement (decision 0006). Time against coverage."""
 GRAVITY_CANCELS: Final = 0.8
 """Maximum share of an unstated spring that gravity may cancel. Judgement (decision 0029). Beyond this share
-the two imitate a nonlinear spring. Silverbox is not an independent test."""
+spring and gravity together imitate a nonlinear spring. Silverbox is not an independent test."""
 PLAUSIBLE_RUNS: Final = 0.5
 """Minimum share of the runs in which an effect must agree with its definition. Convention."""
 TURNED_AS_WELL: Final = 1.01
-"""Maximum ratio of χ² at which a fit with the angle turned by half a turn explains the readings equally well.
+"""Maximum ratio of χ² for a fit with the angle turned by half a turn to explain the readings equally well.
 Judgement."""
 
 #: The parameters of a general form, as ``effect.parameter``.
 Form: TypeAlias = tuple[str, ...]
 
-_POLISH = 1e-7  # drop of χ², as a share of it, at which a polished fit has converged
+_POLISH = 1e-7  # drop of χ², as a share of χ², at which a polished fit has converged
 _SAME_READING = 0.2  # noise standard deviations of a block mean
 
 
@@ -57,8 +57,8 @@ class Hypothesis:
         fit: the fit, in the noise of the sensor.
         textbook: the fit with the textbook form, where forms were freed; else None.
         short: the same set fitted to shorter stretches of the runs, where effects are added there.
-        repeating: the same set fitted to runs that repeat exactly, from which effects are added too.
-        plain: a fit with the textbook form to which free forms add no weight; None: no such fit is known.
+        repeating: the same set fitted to runs that repeat exactly; effects are added to it, too.
+        plain: a fit with the textbook form, if free forms add no weight to it; None: no such fit is known.
         moment: the random moment beside the effects; None where there is none.
     """
 
@@ -72,16 +72,16 @@ class Hypothesis:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the causes, sorted; one that acts both steadily and at random once."""
+        """Names of the causes, sorted, each listed once even if it acts both steadily and at random."""
         kinds = () if self.moment is None else self.moment.kinds
         return tuple(sorted({*self.effects, *(kind.name for kind in kinds)}))
 
     @property
     def fit_of_answer(self) -> Fit:
-        """The fit that an answer is stated by: beside a random moment, the one to runs that repeat.
+        """The fit that supplies the answer's parameters: beside a random moment, the fit to runs that repeat.
 
-        The random motion is larger than what the runs differ by, and beside it narrow deviations would pull the
-        common parameters.
+        The random motion is larger than the differences between the runs. Beside it, narrow deviations would
+        bias the common parameters.
         """
         return self.fit if self.moment is None else self.repeating or self.fit
 
@@ -94,8 +94,8 @@ class Hypothesis:
     def further_numbers(self) -> int:
         """Freed form parameters and instants in a run, less two where gravity replaces a spring.
 
-        An instant absorbs any slow phase error, as a form does. A spring would have to soften by chance, and as
-        much as gravity does.
+        An instant absorbs any slow phase error, as a form does. Without gravity, a spring would have to soften
+        by chance, and by as much as gravity does.
         """
         problem = self.fit.problem
         numbers = self.forms + sum(
@@ -111,9 +111,9 @@ class Hypothesis:
 
     @property
     def under_load(self) -> bool:
-        """Whether it is one effect alone that may grow with the moment of an actuator.
+        """Whether the set is one effect that may grow with the moment of an actuator.
 
-        Its textbook form then explains little, and says little of its form under load.
+        The misfit of its textbook form then says little about its form under load.
         """
         problem = self.fit.problem
         by_load = any(info.of_load for kind in problem.effects for info in kind.parameters())
@@ -135,7 +135,7 @@ class Hypothesis:
 
     @cached_property
     def explains_runs(self) -> bool:
-        """Whether each of the runs, which differ by chance, is explained down to chance."""
+        """Whether every run is explained down to chance, in runs that differ by chance."""
         return bool(self.fit.problem.scatter) and self.leaves_within(np.zeros(len(CHANNELS)))
 
     def leaves_within(self, error: Array) -> bool:
@@ -167,14 +167,14 @@ class Hypothesis:
 
 @dataclass(frozen=True, eq=False)
 class Scale:
-    """The reference by which sets are compared: the misfit that needs no cause, and the least of any set.
+    """The reference for comparing sets: the misfit that needs no cause, and the least misfit of any set.
 
     Args:
         misfit: χ² by channel, shape (6,).
         least: χ² by channel, shape (6,), 0 or less.
         chosen: how sets are weighed.
-        scatter_cost: of the nominal model, as `ChannelMisfit` has it, dimensionless.
-        deviation_precision: as `ChannelMisfit` has it, shape (runs, kinds, kinds).
+        scatter_cost: cost of the nominal model's scatter, as in `ChannelMisfit`, dimensionless.
+        deviation_precision: as in `ChannelMisfit`, shape (runs, kinds, kinds).
     """
 
     misfit: Array
@@ -195,7 +195,7 @@ class Scale:
         return self._log_weight(hypothesis.excess - self.least, hypothesis, scatter_cost=cost)
 
     def weight_of(self, given: FittedSet) -> float:
-        """Logarithm of the weight of a set whose misfit is known."""
+        """Logarithm of the weight of a set with known misfit."""
         costs, left = (given.scatter_cost, self.scatter_cost), given.excess - self.least
         return log_weight(
             left, self.misfit, len(given.effects), given.numbers, self.chosen, costs, given.shown_between_runs
@@ -232,16 +232,16 @@ def of_more_weight(one: Hypothesis | None, other: Hypothesis, gap: ChannelMisfit
 
 
 def own_gain(problem: Problem) -> float:
-    """Chance drop of χ² by the instants and phases of single runs."""
+    """Drop of χ² by chance due to the instants and phases of single runs."""
     gain = problem.data.settings.weighing.own_number_gain
     return float(gain * problem.parameters.of_effects * len(problem.data.runs))
 
 
 def is_plausible(fitted: Fit) -> bool:
-    """Whether every effect of a fit still is what its name means, in enough of the runs.
+    """Whether, in enough of the runs, every effect of a fit still has the meaning of its name.
 
-    Gravity that cancels most of an unstated spring is not: it imitates a nonlinear spring. Neither is a power law
-    whose free exponent ends at a bound, nor friction whose rate does: the readings ask for another law.
+    Gravity that cancels most of an unstated spring fails: it imitates a nonlinear spring. A power law fails if
+    its free exponent ends at a bound, and friction if its rate does: the readings ask for another law.
     """
     problem, effects = fitted.problem, fitted.problem.effects_at(fitted.point.common)
     spring, gravity = fitted.fitted_spring, sum(effect.stiffness_at_rest for effect in effects)
@@ -264,11 +264,11 @@ def is_plausible(fitted: Fit) -> bool:
 def turned_back(fitted: Fit) -> Fit:
     """The fit with the sensor's zero within the readings.
 
-    Gravity of the opposite sign, half a turn away, moves the body alike, and fits of large swings may end there.
+    Gravity of the opposite sign, half a turn away, moves the body alike, so fits of large swings may end there.
 
     Returns:
-        Where the zero is beyond the readings, the fit from half a turn nearer if it explains them as well; else
-        the given fit.
+        If the zero is outside the readings, the fit that starts half a turn nearer, provided that it explains
+        them as well; else the given fit.
     """
     problem, readings = fitted.problem, [run.reading for run in fitted.problem.data.runs]
     least, greatest = min(float(r.min()) for r in readings), max(float(r.max()) for r in readings)
@@ -286,7 +286,7 @@ def turned_back(fitted: Fit) -> Fit:
 
 
 def restricted(whole: Fit, names: Collection[str]) -> Fit:
-    """A fit with some effects only, by name; all else, with the residuals, is the whole fit's.
+    """A fit with only the named effects; everything else, with the residuals, comes from the whole fit.
 
     Returns:
         A start, with its sensitivities, for the fit of the smaller problem.
@@ -317,13 +317,14 @@ def with_forms(
 ) -> list[Hypothesis]:
     """Free the forms of the best hypotheses where the textbook form leaves a large residual and they gain weight.
 
-    A hypothesis that would weigh less than the best one with no residual is not tried. The deepest minimum of the
-    textbook form is sought first: a rod that misses its ringing does not lack a form.
+    A hypothesis is not tried if it would weigh less than the best one even without a residual. The deepest
+    minimum of the textbook form is sought first: a rod fitted at a wrong ringing frequency does not need a
+    form.
 
     Args:
         gap: misfit of the nominal model.
-        least: excess of a textbook form from which freeing it is tried, dimensionless (noise variances).
-        count: number of the best that are tried with free forms, beside effects that may act under load.
+        least: minimum excess of a textbook form for it to be freed, in noise variances.
+        count: number of best hypotheses tried with free forms, in addition to effects that may act under load.
 
     Returns:
         All hypotheses, best first.
@@ -343,7 +344,7 @@ def with_forms(
         for forms in _choices(textbook):
             parts = [fit for part, fit in tried.items() if _within(part, forms)]
             if parts and parts[0] is None:
-                continue  # forms together; the first gains alone, while it may hide the others
+                continue  # a combination: its first form must gain alone, and may hide the gain of the others
             gained = (fit for fit in parts if fit is not None)
             start = min(gained, key=lambda fit: fit.total, default=textbook)
             tried[forms] = freed = _free_forms(start, forms)
@@ -372,7 +373,7 @@ def _within(part: Sequence[Form], forms: Sequence[Form]) -> bool:
 
 
 def _forms_by_effect(fitted: Fit) -> list[list[Form]]:
-    """The forms of every effect that the runs can show; where some are free already, the largest of these alone."""
+    """The forms of every effect that the runs can show; if some are free already, the largest of those only."""
     free, load_varies = fitted.problem.free_forms, fitted.problem.carries_load
     by_effect = [
         [tuple(f"{kind.name}.{name}" for name in form) for form in kind.shown_forms(load_varies=load_varies)]
@@ -385,18 +386,18 @@ def _forms_by_effect(fitted: Fit) -> list[list[Form]]:
 
 
 def _needed(freed: Fit, forms: Collection[Form], rise: float) -> tuple[Form, ...]:
-    """The forms without which χ² would rise by more than a given amount."""
+    """The forms that would raise χ² by more than a given amount in the textbook form."""
     infos = {f"{k.name}.{i.name}": i for k in freed.problem.effects for i in k.parameters()}
 
     def pull(name: str) -> float:
-        std = freed.std(name)  # an undetermined form has none
+        std = freed.std(name)  # 0 for an undetermined form
         return (freed.value(name) - infos[name].default) / std if std > 0.0 else 0.0
 
     return tuple(form for form in forms if max(pull(name) ** 2 for name in form) > rise)
 
 
 def converged(fitted: Fit) -> Fit:
-    """The fit continued to convergence; itself where that fails."""
+    """The fit continued to convergence; the given fit where that fails."""
     return try_fit(fitted.problem, fitted.point, tolerance=_POLISH) or fitted
 
 
@@ -404,8 +405,8 @@ def polish(chosen: Hypothesis) -> Hypothesis:
     """The hypothesis fitted to convergence with its forms free, so that its covariance includes the forms.
 
     Returns:
-        The same effects with a χ² no larger, except for the change by following the rod; unchanged where the fit
-        fails.
+        The effects stay the same, and χ² does not rise, except by resolving the rod's ringing. The hypothesis
+        is unchanged where the fit fails.
     """
     first = chosen.fit
     problem = dataclasses.replace(first.problem, resolve_rod_mode=True)
@@ -437,9 +438,9 @@ def _first_forms(fitted: Fit) -> tuple[Form, ...]:
 
 
 def _likeliest_forms(fitted: Fit) -> tuple[Form, ...]:
-    """The first form of every effect, or another that explains much of its residual, beyond chance.
+    """The first form of every effect, or another that explains much of the residual, beyond chance.
 
-    Where the noise is overestimated, a wrong form may leave less than the noise as a whole.
+    Where the noise is overestimated, even a wrong form may leave less than the noise.
     """
     by_effect, best = _forms_by_effect(fitted), _first_forms(fitted)
 
@@ -459,7 +460,7 @@ def _likeliest_forms(fitted: Fit) -> tuple[Form, ...]:
 
 
 def _worth_a_form(fitted: Fit, least: float) -> float:
-    """χ² below which another form explains much of the residual, beyond chance, dimensionless.
+    """Maximum χ² of another form that explains much of the residual, beyond chance, dimensionless.
 
     Args:
         least: χ² with the forms so far.
@@ -474,7 +475,7 @@ def _explains_more(together: Fit, alone: Fit) -> bool:
 
 
 def _free_forms(fitted: Fit, forms: Collection[Form], tolerance: float = 1e-4) -> Fit | None:
-    """The same effects with only some forms free; None where none is, or there is no gain."""
+    """The same effects with only some forms free; None if no form is free, or there is no gain."""
     problem = fitted.problem
     if not forms:
         return None
@@ -484,5 +485,5 @@ def _free_forms(fitted: Fit, forms: Collection[Form], tolerance: float = 1e-4) -
     start = Point(np.array([(defaults | values)[name] for name in freed.names]), fitted.point.per_run)
     found = try_fit(freed, start, tolerance=tolerance)
     if found is None or not any(found.std(name) > 0.0 for name in freed.names if name not in values):
-        return None  # also where the runs determine no form
+        return None  # also if the runs determine no form
     return found if found.total < fitted.total and is_plausible(found) else None

@@ -41,17 +41,17 @@ def investigate(
     """Test a campaign for a gap, and weigh the effects that may cause it.
 
     Args:
-        campaign: in its own units.
+        campaign: the measured campaign, in its own units.
         kinds: the effects that may be named.
         progress: called with the name of each step.
         model: the nominal model of the campaign, in the same units; None: the model of its kind.
-        settings: of the diagnosis.
-        rivals: from outside the vocabulary, weighed beside the effects.
-        views: in which sets of effects are found, in order of preference.
+        settings: settings of the diagnosis.
+        rivals: causes from outside the vocabulary, weighed beside the effects.
+        views: the views in which sets of effects are found, in order of preference.
 
     Returns:
-        The study. Disturbed runs end at their disturbance. It includes a lead of the motion over its input where
-        that explains more with no more causes.
+        The study. Disturbed runs end at their disturbance. The study allows the motion to lead its input if
+        that explains more without more causes.
 
     Raises:
         TunnelError: when the nominal model cannot be fitted to the runs.
@@ -85,7 +85,7 @@ def investigate(
 def without_odd_runs(
     found: Study, campaign: Campaign, model: NominalModel, study: Callable[[Campaign, NominalModel], Study]
 ) -> Study:
-    """The study of the runs, without runs that differ from the others as a whole.
+    """The study without the runs that differ from the others as a whole.
 
     Args:
         found: the study of all runs.
@@ -93,7 +93,7 @@ def without_odd_runs(
         study: makes the study of a campaign.
 
     Returns:
-        With the runs that are left out among the disturbed ones; unchanged where no set explains the others.
+        With the left-out runs among the disturbed ones; unchanged where no set explains the other runs.
     """
     for _ in range(max(1, int(DISTURBED_SHARE * len(campaign.runs)))):
         odd = odd_runs(campaign, found)
@@ -102,7 +102,7 @@ def without_odd_runs(
         try:
             campaign = undisturbed(campaign, odd)
             again = study(campaign, model.of(campaign))
-        except TunnelError:  # the others do not determine the model
+        except TunnelError:  # the other runs do not determine the model
             break
         if again.causes == UNKNOWN:
             break
@@ -126,7 +126,7 @@ def nominal_study(
 
     Args:
         kinds: the effects that may be detected in the records.
-        settings: of the diagnosis.
+        settings: settings of the diagnosis.
 
     Raises:
         TunnelError: when the nominal model cannot be fitted to the runs.
@@ -144,12 +144,12 @@ def explains_more(again: Study, found: Study) -> bool:
 
 
 def likeliest_lead(study: Study) -> float:
-    """The lead of least residual with the answer's effects, without a delay, s of the measured campaign.
+    """The lead with the least residual for the answer's effects, without a delay, s of the measured campaign.
 
     Returns:
-        0 where it is not clear, there is no gap, or the runs have no input.
+        0 where it is not determined, there is no gap, or the runs have no input.
     """
-    from scipy.special import chdtri  # only here: slow to load
+    from scipy.special import chdtri  # imported here because it is slow to load
 
     problem, point = study.chosen.problem, study.chosen.point
     leads, totals = np.array(study.model.possible_leads()), []

@@ -1,8 +1,8 @@
 """A run that differs from all others as a whole.
 
-A cause acts in all runs. Where a few causes, or none, explain every run but one, and the other runs include its
-wind state and its spring, the simplest explanation is that something happened to that run: its start was held, its
-logger filtered, its gain was another.
+A cause acts in all runs. Suppose that few causes, or none, explain every run but one, and that the other runs
+include its wind state and its spring. The simplest explanation is then a fault of that run: its start was held,
+its logger filtered the signal, or its gain differed.
 """
 
 from __future__ import annotations
@@ -39,19 +39,19 @@ if TYPE_CHECKING:
     from diagnosis.search.study import Study
 
 DISTURBED_FEWEST: Final = 3
-"""Minimum number of free decays in which a disturbed run is sought. Judgement. With two runs, a disturbance
-of one cannot be distinguished from a property of all."""
+"""Minimum number of free decays in a campaign to be searched for a disturbed run. Judgement. With two runs, a
+disturbance of one cannot be distinguished from a property of all."""
 DISTURBED_SHARE: Final = 0.25
 """Maximum share of the runs that may be disturbed; at least one run. Judgement. The others show the common
 behaviour."""
 DISTURBED_KEPT: Final = 6.0
-"""Minimum number of cycles before a disturbance for that part of the run to be used. Otherwise the run is
-left out. Judgement. A record needs three cycles, and its damping needs twice as many."""
+"""Minimum number of cycles before a disturbance for that part of the run to be used. Otherwise the run is left
+out. Judgement. A record needs three cycles, and its damping needs twice as many."""
 ODD_HOLDS: Final = 0.5
-"""Minimum share of the gap in each of several odd runs, of the gap of the runs that are left. Convention.
+"""Minimum share of the gap in each of several odd runs, relative to the gap of the remaining runs. Convention.
 Most of it."""
 
-_SETS, _RUNS = 6, 2  # sets, and runs of each, that are refitted
+_SETS, _RUNS = 6, 2  # number of sets, and of runs for each, that are refitted
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +59,7 @@ class OddRuns:
     """One run or a few, and a set that may explain the others.
 
     Args:
-        p_values: by id of the runs, the probability by chance of so large a misfit, times the number of runs.
+        p_values: by run id, the probability by chance of as large a misfit, times the number of runs.
         beside: the set, fitted to the other runs.
     """
 
@@ -70,7 +70,7 @@ class OddRuns:
 def odd_alone(measured: Campaign, nominal: Fit, kinds: Sequence[type[Effect]]) -> tuple[Disturbance, ...]:
     """The runs without which the nominal model explains the others; none where a cause explains all as simply.
 
-    Two effects never do: they cost more than an odd run.
+    Two effects are never as simple: they cost more than an odd run.
 
     Args:
         measured: the campaign in its own units.
@@ -95,8 +95,8 @@ def odd_runs(measured: Campaign, study: Study) -> tuple[Disturbance, ...]:
         study: of all its runs.
 
     Returns:
-        The likeliest, at one rate of false alarms. Driven runs are not among them, nor is a run that alone has its
-        wind state or its spring: its difference may come from its conditions.
+        The most likely odd runs, at one false-alarm rate. They exclude driven runs, and a run that alone has
+        its wind state or its spring, because its conditions may explain the difference.
     """
     nominal, answer = study.nominal, study.answer
     if not study.gap.test.detected:
@@ -111,8 +111,8 @@ def odd_runs(measured: Campaign, study: Study) -> tuple[Disturbance, ...]:
 
 
 def _stated(odd: OddRuns | None, measured: Campaign, nominal: Fit) -> tuple[Disturbance, ...]:
-    """Odd runs as facts, with the start of the part that moves as the others do."""
-    found, data = list[Disturbance](), nominal.problem.data
+    """Odd runs as facts, with the start of the part that moves like the other runs."""
+    disturbances, data = list[Disturbance](), nominal.problem.data
     if odd is None:
         return ()
     for name, p_value in odd.p_values.items():
@@ -122,17 +122,17 @@ def _stated(odd: OddRuns | None, measured: Campaign, nominal: Fit) -> tuple[Dist
             run = next(one for one in measured.runs if one.id == name)
             begun = float(run.record.time_s[0]) + run.clock_s
             start = begun + data.similarity.own(data.runs[index].start + start, "s")
-        found.append(Disturbance(name, None, None, p_value, kept_from_s=start))
-    return tuple(found)
+        disturbances.append(Disturbance(name, None, None, p_value, kept_from_s=start))
+    return tuple(disturbances)
 
 
 def _free_from(others: Fit, nominal: Fit, index: int) -> float | None:
-    """The time since the start of a run's fitted part from which the model of the others explains it, s.
+    """The time since the start of a run's fitted part from which the other runs' model explains it, s.
 
-    None where there is none within the first quarter of the run, or too few cycles are left.
+    None if there is no such time within the first quarter of the run, or too few cycles remain.
     """
     chosen, run = nominal.settings.selection, nominal.problem.data.runs[index]
-    cycle = 1.0 / (resonance(nominal, index) * run.interval)  # in blocks
+    cycle = 1.0 / (resonance(nominal, index) * run.interval)  # length in blocks
     for quarters in range(1, int(run.reading.size / cycle) + 1):
         first = round(quarters * cycle / 4.0)
         if run.reading.size - first < DISTURBED_KEPT * cycle:
@@ -142,10 +142,10 @@ def _free_from(others: Fit, nominal: Fit, index: int) -> float | None:
         start.per_run[0, 0] = data.runs[0].reading[0]
         problem = replace(others.problem, data=data)
         slopes = [slope for _, slope in sensitivities(problem, start)]
-        _, (left,) = refit_releases(problem, start, slopes)
+        _, (residual,) = refit_releases(problem, start, slopes)
         level = max(others.total / others.count, 1.0)
         if (
-            float(fdtrc(left.size, others.count, float(left @ left) / left.size / level))
+            float(fdtrc(residual.size, others.count, float(residual @ residual) / residual.size / level))
             > chosen.disturbed_rate
         ):
             return first * run.interval
@@ -153,14 +153,14 @@ def _free_from(others: Fit, nominal: Fit, index: int) -> float | None:
 
 
 def _sets(study: Study) -> list[Hypothesis]:
-    """The sets of effects that were weighed, in runs that repeat: an odd run makes them seem to differ."""
-    found = []
+    """The weighed sets of effects, for runs that repeat: an odd run would otherwise look like scatter."""
+    hypotheses = []
     for answer in study.answers:
-        one = answer.hypothesis
-        fit = None if one is None else one.repeating if one.fit.problem.scatter else one.fit
-        if one is not None and fit is not None and one.effects:
-            found.append(Hypothesis(one.effects, fit))
-    return found
+        whole = answer.hypothesis
+        fit = None if whole is None else whole.repeating if whole.fit.problem.scatter else whole.fit
+        if whole is not None and fit is not None and whole.effects:
+            hypotheses.append(Hypothesis(whole.effects, fit))
+    return hypotheses
 
 
 def _explaining(sets: Sequence[Hypothesis], nominal: Fit, kinds: Sequence[type[Effect]]) -> list[OddRuns]:
@@ -174,31 +174,31 @@ def _explaining(sets: Sequence[Hypothesis], nominal: Fit, kinds: Sequence[type[E
     if data.driven or len(data.runs) < DISTURBED_FEWEST:
         return []
     refitted = list(_without_a_run(sets))
-    gaps = {tuple(one.p_values): gap_left(one.beside.fit) for one in refitted if not one.beside.effects}
-    tried = [one for one in refitted if max(one.p_values.values()) < chosen.disturbed_rate]
-    found = [
-        one
-        for one in tried
-        if (gap := gaps.get(tuple(one.p_values))) is not None
-        and one.beside.leaves_within(error_of_form(gap, weighing) * bool(one.beside.effects))
+    gaps = {tuple(odd.p_values): gap_left(odd.beside.fit) for odd in refitted if not odd.beside.effects}
+    tried = [odd for odd in refitted if max(odd.p_values.values()) < chosen.disturbed_rate]
+    explaining = [
+        odd
+        for odd in tried
+        if (gap := gaps.get(tuple(odd.p_values))) is not None
+        and odd.beside.leaves_within(error_of_form(gap, weighing) * bool(odd.beside.effects))
     ]
-    if found or nominal.problem.scatter:
-        return found
-    for one in _without_several([one for one in tried if not one.beside.effects], nominal, kinds):
-        if one.beside.explains_runs or one.beside.leaves_within(np.zeros(len(CHANNELS))):
-            if not one.beside.fit.problem.scatter:
-                return [one]
+    if explaining or nominal.problem.scatter:
+        return explaining
+    for odd in _without_several([odd for odd in tried if not odd.beside.effects], nominal, kinds):
+        if odd.beside.explains_runs or odd.beside.leaves_within(np.zeros(len(CHANNELS))):
+            if not odd.beside.fit.problem.scatter:
+                return [odd]
             differing = scattered(nominal, kinds)
-            return [one] if differing is not None and not _are_explained(differing, one) else []
+            return [odd] if differing is not None and not _are_explained(differing, odd) else []
     return []
 
 
 def _without_several(
     tried: Sequence[OddRuns], nominal: Fit, kinds: Sequence[type[Effect]]
 ) -> Iterator[OddRuns]:
-    """The nominal model without a run, without a further one, and so on, beside chance differences if they show.
+    """The nominal model without one run, without two, and so on; with chance differences if the runs show any.
 
-    Each run shows most of the gap of the runs that are left. One odd run may hide another.
+    Each of these runs shows most of the gap of the remaining runs. One odd run may hide another.
 
     Args:
         tried: the nominal model without each run.
@@ -217,7 +217,7 @@ def _without_several(
 
 
 def _worst_of(whole: Fit, tried: Sequence[OddRuns]) -> OddRuns | None:
-    """The run without which most of the gap vanishes; None where there is none."""
+    """The run without which most of the gap vanishes; None if there is none."""
     chosen = whole.settings.selection
     best = min(tried, key=lambda one: one.beside.fit.total, default=None)
     left = np.inf if best is None else best.beside.fit.total - best.beside.fit.count
@@ -227,10 +227,10 @@ def _worst_of(whole: Fit, tried: Sequence[OddRuns]) -> OddRuns | None:
 
 
 def _worst_beside(differing: Fit, whole: Fit) -> OddRuns | None:
-    """The run that shows most of the gap beside chance differences; None where there is none.
+    """The run that shows most of the gap beside chance differences; None if there is none.
 
     Args:
-        whole: the fit without them.
+        whole: the fit without chance differences.
     """
     chosen, data = whole.settings.selection, whole.problem.data
     own = np.array([float(r @ r) - r.size for r in differing.residuals])
@@ -255,43 +255,47 @@ def _are_explained(fitted: Fit, odd: OddRuns) -> bool:
 
 
 def _simplest(
-    found: Sequence[OddRuns], rivals: Sequence[Hypothesis], nominal: Fit, at_random: FittedSet | None = None
+    candidates: Sequence[OddRuns],
+    rivals: Sequence[Hypothesis],
+    nominal: Fit,
+    at_random: FittedSet | None = None,
 ) -> OddRuns | None:
-    """The likeliest odd runs; None where there is none, or a rival set of causes of all runs weighs as much.
+    """The most likely odd runs; None if there are none, or a rival set of causes in all runs weighs as much.
 
     Args:
         at_random: a rival set with a random moment.
     """
-    if not found:
+    if not candidates:
         return None
     share, count = nominal.settings.selection.odd_share, len(nominal.problem.data.runs)
     if any(
-        one.beside.fit.problem.scatter for one in found
-    ):  # a set that leaves a gap has no evidence to compare
-        rivals = [one for one in rivals if one.leaves_within(np.zeros(len(CHANNELS)))]
+        odd.beside.fit.problem.scatter for odd in candidates
+    ):  # a set that leaves a gap cannot be compared by its evidence
+        rivals = [rival for rival in rivals if rival.leaves_within(np.zeros(len(CHANNELS)))]
         at_random = None
-    sets = [*rivals, *(one.beside for one in found)]
+    sets = [*rivals, *(odd.beside for odd in candidates)]
     scale = Scale.of(sets, gap_left(nominal), nominal.settings.weighing)
-    best = max(found, key=lambda one: _weight(one.beside, scale))
-    # one of the runs is odd in a share of the campaigns
+    best = max(candidates, key=lambda odd: _weight(odd.beside, scale))
+    # the odds of an odd run: the share of campaigns that have one
     weight = _weight(best.beside, scale) - len(best.p_values) * np.log(count * (1.0 - share) / share)
-    # the forms of an answer are free where that pays, and are not compared with an odd run
-    weights = [_weight(one, scale) + scale.chosen.form_price * one.further_numbers for one in rivals]
+    # the price of a rival's free forms does not count in favour of an odd run
+    weights = [_weight(rival, scale) + scale.chosen.form_price * rival.further_numbers for rival in rivals]
     weights += [] if at_random is None else [scale.weight_of(at_random)]
     if weight <= max(weights, default=-np.inf):
         return None
-    # a deviation of its stiffness, damping or wind speed may be chance
-    by_chance = any(one.fit.problem.scatter and _are_explained(one.fit, best) for one in rivals)
+    # chance may explain a deviation in stiffness, damping or wind speed
+    by_chance = any(rival.fit.problem.scatter and _are_explained(rival.fit, best) for rival in rivals)
     return None if by_chance else best
 
 
-def _weight(one: Hypothesis, scale: Scale) -> float:
-    """Logarithm of the weight of a set; chance differences between its runs count by their own evidence."""
-    if not one.fit.problem.scatter:
-        return scale.weight(one)
-    cost = gap_left(one.fit).scatter_cost
-    excess = one.excess - scale.least
-    return log_weight(excess, scale.misfit, len(one.effects), one.further_numbers, scale.chosen, (cost, cost))
+def _weight(hypothesis: Hypothesis, scale: Scale) -> float:
+    """Logarithm of the weight of a set; chance differences between the runs count by their evidence."""
+    if not hypothesis.fit.problem.scatter:
+        return scale.weight(hypothesis)
+    cost = gap_left(hypothesis.fit).scatter_cost
+    excess = hypothesis.excess - scale.least
+    count, further = len(hypothesis.effects), hypothesis.further_numbers
+    return log_weight(excess, scale.misfit, count, further, scale.chosen, (cost, cost))
 
 
 def replaceable(data: Data) -> list[int]:
@@ -312,7 +316,7 @@ def _same_spring(one: float | None, other: float | None) -> bool:
 
 
 def _acts_at_random(nominal: Fit, others: Fit) -> bool:
-    """Whether a random moment alike in all runs in which it acts explains the residual, and the others may hide it.
+    """Whether a random moment alone explains the residual of all runs in which it acts, hidden by the others.
 
     Args:
         others: the fit to the runs that are not odd, which needs no random moment.
@@ -328,44 +332,44 @@ def _acts_at_random(nominal: Fit, others: Fit) -> bool:
 
 
 def _expected(data: Data, noisy: Data) -> float:
-    """The drop of −2 ln L by a random moment that runs with its response as noise would show, dimensionless."""
+    """The expected drop of −2 ln L by a random moment in runs with noise equal to its response, dimensionless."""
     pairs = zip(data.runs, noisy.runs, strict=True)
     ratios = [(run.reading.size, more.noise.variance / run.noise.variance) for run, more in pairs]
     return float(sum(size * (ratio - 1.0 - np.log(ratio)) for size, ratio in ratios))
 
 
 def _without_a_run(sets: Sequence[Hypothesis]) -> Iterator[OddRuns]:
-    """The sets without the runs that they explain least: least misfit first, or fewest effects if equal by chance.
+    """The sets without the runs that they explain least: by least misfit, then fewest effects if equal by chance.
 
-    Without such a run most of a set's misfit vanishes, by linear theory. The nominal model, the first of the sets,
-    is fitted without each run without which a set is fitted.
+    Without such a run most of a set's misfit vanishes, by linear theory. The nominal model is the first of the
+    sets; it is also fitted without each run that is left out for another set.
     """
     data = sets[0].fit.problem.data
     runs = replaceable(data)
     if not runs:
         return
     tried = []
-    for one in sets:
-        without = WithoutRuns.of(one.fit)
-        left = (without.total - without.count)[runs]
-        most = (1.0 - ODD_HOLDS) * (one.fit.total - one.fit.count)
-        order = [runs[place] for place in np.argsort(left) if left[place] < most]
-        tried.append((float(left.min()), one, order))
+    for hypothesis in sets:
+        without = WithoutRuns.of(hypothesis.fit)
+        excesses = (without.total - without.count)[runs]
+        most = (1.0 - ODD_HOLDS) * (hypothesis.fit.total - hypothesis.fit.count)
+        order = [runs[place] for place in np.argsort(excesses) if excesses[place] < most]
+        tried.append((float(excesses.min()), hypothesis, order))
     (_, nominal, of_nominal), *others = tried
     by_chance = nominal.fit.settings.weighing.chance_stds * np.sqrt(2.0 * nominal.fit.count)
     others.sort(key=lambda given: (max(given[0], by_chance), len(given[1].effects)))
-    likely = [(one, order[:_RUNS]) for _, one, order in others[:_SETS]]
+    likely = [(hypothesis, order[:_RUNS]) for _, hypothesis, order in others[:_SETS]]
     asked = [index for index in runs if index in of_nominal or any(index in order for _, order in likely)]
-    for one, order in [(nominal, asked), *likely]:
+    for hypothesis, order in [(nominal, asked), *likely]:
         for index in order:
-            fitted = refitted_without(one.fit, index)
+            fitted = refitted_without(hypothesis.fit, index)
             if fitted is not None:
-                p_value = _p_value(one.fit, fitted, index)
-                yield OddRuns({data.runs[index].id: p_value}, Hypothesis(one.effects, fitted))
+                p_value = _p_value(hypothesis.fit, fitted, index)
+                yield OddRuns({data.runs[index].id: p_value}, Hypothesis(hypothesis.effects, fitted))
 
 
 def _p_value(whole: Fit, others: Fit, index: int) -> float:
-    """Probability by chance that a run adds so much to χ², with the misfit of the others as noise."""
+    """Probability by chance that a run adds so much to χ², with the misfit of the other runs as noise."""
     filled = whole.problem.data.runs[index].filled
     added = max(whole.total - others.total, 0.0) / filled
     level = max(others.total / others.count, 1.0)

@@ -33,15 +33,15 @@ GROWN_BY: Final = 4
 SAME_CHANGE: Final = 0.02
 """Maximum difference between the changes of two equivalent sets, as a share of the power. Judgement."""
 
-_ITERATIONS = 12  # of an intermediate fit; the answer's is polished
+_ITERATIONS = 12  # iterations of an intermediate fit; the fit of the answer is polished
 
 
 def second_mode_alone(nominal: Fit, kinds: Sequence[type[Effect]]) -> Hypothesis | None:
     """The second mode, where the nominal model misses the motion because it has only one mode.
 
     Returns:
-        The fit with the mode added; None where it misses the motion too, where a frequency and a damping of every
-        run explain as much, or where it may not be tried.
+        The fit with the mode added; None where it misses the motion as well, where a frequency and a damping of
+        every run explain as much, or where the mode may not be tried.
     """
     modes = [kind for kind in kinds if issubclass(kind, SecondOscillation)]
     found = sets_with_one_more([Hypothesis((), nominal)], modes)
@@ -53,7 +53,7 @@ def second_mode_alone(nominal: Fit, kinds: Sequence[type[Effect]]) -> Hypothesis
 
 
 def same_change(one: Fit, other: Fit, nominal: Fit) -> bool:
-    """Whether two fits differ by a small share of the power of their change to the nominal fit."""
+    """Whether two fits differ by a small share of the power of their change from the nominal fit."""
     apart = sum(float(np.sum((a - b) ** 2)) for a, b in zip(one.residuals, other.residuals, strict=True))
     return apart < SAME_CHANGE * (nominal.total - max(one.total, other.total))
 
@@ -64,10 +64,10 @@ def sets_with_one_more(
     """The sets with one more effect, each fitted from its best starting points.
 
     Returns:
-        One for every set of effects: the one of more weight where two sets lead to it, so that a freed form of one
-        does not exclude the other.
+        One set for each combination of effects. If two sets lead to it, the one with more weight is taken, so
+        that a freed form of one does not exclude the other.
     """
-    # alone, a freed form also follows the effects of other causes
+    # a form freed alone also follows the effects of other causes
     single = [h for h in level if len(h.effects) == 1]
     textbook = [Hypothesis(h.effects, h.textbook) for h in single if h.textbook is not None]
     sets: dict[tuple[str, ...], Hypothesis] = {}
@@ -94,10 +94,10 @@ def sets_with_one_more(
 def _worth_fitting(
     parent: Hypothesis, kinds: Sequence[type[Effect]]
 ) -> list[tuple[type[Effect], list[StartingPoint]]]:
-    """The effects that linear theory predicts to explain most; generously many after the nominal model.
+    """The effects that explain most by linear theory; generously many after the nominal model.
 
-    Beside other effects, those predicted to gain no more than chance are left out. Where chance differences
-    between the runs explain them, the effects of greatest predicted likelihood are fitted.
+    Beside other effects, an effect is left out if its predicted gain is chance. Where chance differences
+    between the runs explain the effects, those with the greatest predicted likelihood are fitted.
     """
     scored = [(kind, starts) for kind in kinds if (starts := starting_points(parent.fit, kind))]
     weighing = parent.fit.settings.weighing
@@ -110,13 +110,14 @@ def _worth_fitting(
     )
     if parent.effects or parent.explains_runs:
         own, beyond = own_gain(parent.fit.problem), {}
-        for kind, starts in scored:  # the chance gain of the effect's parameters per run does not count
+        for kind, starts in scored:  # the chance gain of the effect's parameters per run is excluded
             beyond[kind.name] = starts[0].predicted_drop - (own_gain(starts[0].problem) - own)
         if not parent.effects:
             likely = sorted(scored, key=lambda item: -beyond[item[0].name])[:LIKELY_BESIDE_SCATTER]
             return [item for item in likely if beyond[item[0].name] > 0.0]
         worth = [item for item in scored[:GROWN_BY] if beyond[item[0].name] > LEAST_DROP]
-        # linear theory underestimates these: the runs' deviations absorb most of the prediction, not of the effect
+        # linear theory underestimates these effects: the runs' deviations absorb most of the prediction, not
+        # of the effect
         absorbed = [item for item in scored if parent.explains_runs and item[1][0].second_order]
         return worth + [item for item in absorbed if item not in worth and beyond[item[0].name] > 0.0]
     limit = PREDICTED_SHARE * parent.fit.total
@@ -124,7 +125,7 @@ def _worth_fitting(
 
 
 def _repeating(parent: Hypothesis, kind: type[Effect]) -> Fit | None:
-    """The set with one more effect, fitted to runs that repeat exactly; the best from its starting points."""
+    """The set with one more effect, fitted to runs that repeat exactly, by the best of its starting points."""
     base = parent.repeating
     if base is None:
         return None

@@ -1,4 +1,4 @@
-"""A campaign prepared for the search: similar, without its hum, its noise measured and its nominal model fitted."""
+"""A campaign prepared for the search: similar, without hum, its noise measured, its nominal model fitted."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
 HUM_LEFT: Final = 0.02
-"""Maximum residual share of a removed hum that needs no cause. Judgement."""
+"""Maximum share of a removed hum that may remain without a cause. Judgement."""
 
 COARSE_FROM: Final = 1.5
 """Minimum ratio of the step of the readings to the stated resolution for a coarse sensor. Judgement."""
 
-#: The effects detected in the records before any is fitted.
+#: The effects detected in the records before any effect is fitted.
 HUM, COARSE_STEP = the_effect(MainsPickup), the_effect(CoarseSteps)
 
 
@@ -61,20 +61,20 @@ class Prepared:
 
     Args:
         campaign: the similar campaign (`diagnosis.model.similarity`).
-        similarity: the conversion from the measured one.
+        similarity: the conversion from the measured campaign.
         kinds: the effects that may be named.
-        noise: of the records without the hum.
-        trend: of the noise with the motion.
+        noise: noise of the records without the hum.
+        trend: change of the noise with the motion.
         step: of the lattice on which the readings lie, rad; 0 where they are continuous.
         coarse: whether that step is coarser than the stated resolution.
         hum: the hum that was removed, or None.
-        nominal: the nominal fit, to the runs to which answers are fitted.
+        nominal: the nominal fit, to the runs that the answers are fitted to.
         cut: whether the start of every run and the time after its motion were left out, because the nominal model
             misses the motion grossly.
-        rested: runs that end with a long rest, which the fits leave out.
-        tested: the nominal fit in the blocks in which noise and gap were tested, where the blocks of ``nominal``
-            are wider.
-        uncut: the nominal fit to whole runs, where these were cut.
+        rested: runs with a long rest at their end, which the fits leave out.
+        tested: the nominal fit in the blocks used to test noise and gap, if the blocks of ``nominal`` are
+            wider.
+        uncut: the nominal fit to whole runs, if these were cut.
     """
 
     campaign: Campaign
@@ -104,7 +104,7 @@ class Prepared:
 
     @property
     def able(self) -> tuple[type[Effect], ...]:
-        """The effects that a fit can find."""
+        """The effects that can be found by a fit."""
         return tuple(kind for kind in self.kinds if kind.fitted)
 
     @cached_property
@@ -113,10 +113,10 @@ class Prepared:
         return second_mode_alone(self.nominal, self.able) if misses_motion(self.nominal) else None
 
     def left_by_read_off(self, base: Fit) -> Array:
-        """χ² by channel that no set of effects has to explain, shape (6,), dimensionless.
+        """χ² by channel that needs no effect, shape (6,), dimensionless.
 
-        The error of a coarse step is not white, and follows a slow motion. A hum that is not a pure line leaves a
-        small residual.
+        The error of a coarse step is not white, and follows a slow motion. If a hum is not a pure line, its
+        removal leaves a small residual.
 
         Args:
             base: fit of the nominal model to the runs on which sets are compared.
@@ -133,10 +133,10 @@ class Prepared:
         return np.asarray(left + np.maximum(np.mean(tries, axis=0), 0.0), np.float64) if tries else left
 
     def hum_power(self, base: Fit, share: float = 1.0) -> Array:
-        """χ² by channel of the hum that was removed, in the readings of a fit, shape (6,), dimensionless.
+        """χ² by channel of the removed hum, in the readings of a fit, shape (6,), dimensionless.
 
         Args:
-            share: of its power, a fraction.
+            share: share of the hum's power, a fraction.
         """
         size = 0.0 if self.hum is None else share * self.hum.excess * base.count
         return np.array([size * (name == "harmonics") for name in CHANNELS])
@@ -186,7 +186,7 @@ def prepared_and_tested(
         hum = None
         if HUM.name in allowed:
             nominal, noise, hum = _without_hum(campaign, similarity, nominal, noise)
-        # a second mode is missed from the start on, and its decay is counted from there
+        # a second mode is missing from the start on, and its decay is counted from there
         missed = loses_phase(nominal)
         cut = missed and second_mode_alone(nominal, kinds) is None
         uncut = nominal if cut else None
@@ -212,7 +212,7 @@ def _without_hum(
         return nominal, noise, None
     motion = fastest(nominal)
     frequency = refine_frequency(campaign, line, motion)
-    for _ in range(2):  # as a hum may count as noise at first
+    for _ in range(2):  # a hum may count as noise at first
         variance = float(np.mean(list(noise.variance.values())))
         cleaned, hum = remove_hum(campaign, frequency, variance, settings.read_off, motion)
         noise = campaign_noise(cleaned, settings.noise)
@@ -221,7 +221,7 @@ def _without_hum(
 
 
 def fit_nominal(data: Data) -> Fit:
-    """Fit the nominal model; where it misses the motion, start from the runs' own decays as well.
+    """Fit the nominal model; where it misses the motion, start from the runs' decays as well.
 
     Raises:
         TunnelError: when the nominal model cannot be fitted.

@@ -1,8 +1,8 @@
-"""Greatest share of a gap that the known effects could explain: where it is small, no set of them is the cause.
+"""The greatest share of a gap that the known effects could explain; if it is small, no set is the cause.
 
-By linear theory a set of effects explains no more than all effects together, each in every one of its trials, with
-deviations of every run in everything that may differ between runs. Computing this takes as long as starting one
-fit of every effect; fitting the sets takes ten times as long.
+By linear theory a set of effects explains no more than all effects together, with all trials of every effect
+and with deviations of every run in everything that may differ between runs. Computing this takes as long as
+starting one fit of every effect; fitting the sets takes ten times as long.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from tunnel_sim.effects import Effect
 from tunnel_sim.effects.capabilities import OwnNumbers
 from tunnel_sim.vocabulary.record import Array
 
-_NULL = 1e-9  # singular value, relative to the largest, that counts as zero
-_RANK = 1e-6  # for the columns of all effects, which are finite differences
+_NULL = 1e-9  # maximum singular value, relative to the largest, that counts as zero
+_RANK = 1e-6  # the same limit for the columns of all effects, which are finite differences
 
 
 def unexplained_floor(
     base: Fit, kinds: Sequence[type[Effect]], between_runs: Sequence[type[Effect]]
 ) -> float:
-    """The least share of the gap that all effects together leave, by linear theory.
+    """The share of the gap that remains with all effects fitted together, by linear theory.
 
     Args:
         base: the fit of the nominal model.
@@ -44,7 +44,7 @@ def unexplained_floor(
     bases = [_orthonormal(own) for _, own in jacobian]
 
     def beside(change: Sequence[Array]) -> Array:
-        """A change of all runs, concatenated, with the runs' own parameters projected out."""
+        """A change of all runs, concatenated; the runs' parameters are projected out."""
         parts = zip(change, bases, strict=True)
         return np.concatenate([one - basis @ (basis.T @ one) for one, basis in parts])
 

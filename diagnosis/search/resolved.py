@@ -1,7 +1,8 @@
-"""Whether each effect of a set is confirmed by half of the records alone.
+"""Whether half of the records alone confirms each effect of a set.
 
-Readings held out of a fit in stretches share the amplitudes of the others, and test interpolation only. A real
-effect shows at large amplitudes alone, or at small ones alone; an effect that only joins the two halves does not.
+Stretches held out of a fit have the same amplitudes as the fitted ones, so they test interpolation only. A real
+effect shows at large amplitudes alone, or at small ones alone; an effect that only joins the two halves does
+not.
 """
 
 from __future__ import annotations
@@ -18,20 +19,20 @@ from diagnosis.likelihood.partial import fit_seen
 from tunnel_sim.vocabulary.record import Array
 
 RESOLVED_STDS: Final = 2.0
-"""Minimum distance of an effect from zero, fitted to one half of the records, for that half to confirm it, in
+"""Minimum distance of an effect from zero in a fit to one half of the records for that half to confirm it, in
 standard deviations. Convention."""
 
-_ROUNDS = 4  # of the fit of a half
-_SETTLED = 0.5  # standard deviations by which a round may still move a parameter
-_RIDGE = 1e-12  # of the scaled normal matrix: undetermined parameters get a huge variance
+_ROUNDS = 4  # rounds of the fit of a half
+_SETTLED = 0.5  # maximum move of a parameter in the last round, in standard deviations
+_RIDGE = 1e-12  # ridge on the scaled normal matrix: undetermined parameters get a huge variance
 
 
 def unresolved(whole: Fit) -> tuple[str, ...]:
     """The effects that neither the early nor the late half of the records confirms with the sign of the whole.
 
     Amplitudes are large in the early half of a free decay and small in the late half. Each half is fitted
-    separately, with the forms of the whole. An effect is confirmed where its severity is enough standard
-    deviations from zero, including the misfit of the half.
+    separately, with the forms of the fit to whole runs. An effect is confirmed where its severity is enough
+    standard deviations from zero, including the misfit of the half.
 
     Args:
         whole: fit of a set of effects to whole runs.
@@ -60,7 +61,7 @@ def _halves(whole: Fit) -> Iterator[tuple[Array, Array]]:
     for early in (True, False):
         seen = [(np.arange(r.size) < r.size // 2) == early for r in whole.residuals]
         fitted = whole
-        for _ in range(_ROUNDS):  # the sensitivities of the whole may differ much from the half's
+        for _ in range(_ROUNDS):  # the sensitivities of the whole run may differ much from the half's
             before = fitted.point.common
             fitted = fit_at(problem, fit_seen(fitted, seen, held=forms)[0])
             stds = _stds(fitted, seen, forms)
@@ -70,7 +71,7 @@ def _halves(whole: Fit) -> Iterator[tuple[Array, Array]]:
 
 
 def _stds(fitted: Fit, seen: Sequence[NDArray[np.bool_]], held: Collection[str]) -> Array:
-    """Standard deviations from some blocks, their misfit as noise, shape (common,); infinite if undetermined."""
+    """Standard deviations from some blocks, their misfit as noise, shape (common,); infinite: undetermined."""
     names = fitted.problem.names
     free = np.array([name not in held and fitted.bound(name) is None for name in names])
     rows = [(c[s] * free, r[s]) for (c, r), s in zip(fitted.jacobian, seen, strict=True)]

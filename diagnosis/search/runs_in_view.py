@@ -1,4 +1,4 @@
-"""The runs in a view: how they are fitted while sets of causes are grown, and how a set is fitted to whole runs."""
+"""The runs in a view: how they are fitted while sets of causes grow, and how a set is fitted to whole runs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.record import Array
 
 FORM_OPEN: Final = 0.02
-"""Minimum share of the excess unexplained by a textbook form for its forms to be freed. Judgement (decision
+"""Minimum share of the excess that a textbook form leaves unexplained for its forms to be freed. Judgement
+(decision
 0006)."""
 
 
@@ -33,15 +34,15 @@ class RunsInView:
     prepared: Prepared
     base: Fit
 
-    #: Whether the parameters of an answer are fitted in the view, not to whole runs.
+    #: Whether the parameters of an answer are fitted in the view instead of whole runs.
     states_parameters: ClassVar[bool] = False
-    #: Whether the gap may be as small as misbehaving noise, which then explains it.
+    #: Whether the gap may be so small that irregular noise explains it.
     may_be_noise: ClassVar[bool] = False
-    #: Key of the caution about answers that were found in the view; empty: none.
+    #: Key of the caution about answers found in the view; empty: none.
     caution: ClassVar[str] = ""
 
     def on(self, base: Fit) -> Self:
-        """The same view of runs with other noise, given the fit of the nominal model."""
+        """The same view of runs with other noise, for a given fit of the nominal model."""
         return replace(self, base=base)
 
     @cached_property
@@ -51,7 +52,7 @@ class RunsInView:
 
     @cached_property
     def left_by_read_off(self) -> Array:
-        """χ² by channel that no set of effects has to explain, shape (6,), dimensionless."""
+        """χ² by channel that needs no effect, shape (6,), dimensionless."""
         return self.prepared.left_by_read_off(self.base)
 
     @property
@@ -72,45 +73,45 @@ class RunsInView:
         return Hypothesis((), self.base)
 
     def larger(self, level: Sequence[Hypothesis], progress: Progress | None) -> list[Hypothesis]:
-        """The sets with one effect more than a level's sets."""
+        """The sets with one effect more than the sets of a level."""
         return sets_with_one_more(level, self.able, progress)
 
     def with_forms(self, children: Sequence[Hypothesis], level: Sequence[Hypothesis]) -> Sequence[Hypothesis]:
         """Sets with their forms freed where that pays.
 
         Args:
-            level: the sets with one effect less from which they are grown, the best first.
+            level: the sets with one effect less, from which the sets are grown, the best first.
         """
         parent = level[0]
         count = FREED_HYPOTHESES if not parent.effects else 1
         return with_forms(children, self.gap, FORM_OPEN * parent.fit.excess, count)
 
     def to_grow(self, level: Sequence[Hypothesis], going: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """The sets to be grown further; of several that change the readings alike, one.
+        """The sets to be grown further; one of several that change the readings alike.
 
         Args:
-            level: the sets from which they are grown.
+            level: the sets from which the candidates are grown.
             going: the candidates, the best first.
         """
         del level
         kept: list[Hypothesis] = []
-        for hypothesis in going:  # sets that change the readings alike would grow alike
+        for hypothesis in going:  # sets that change the readings alike would also grow alike
             if not any(same_change(hypothesis.fit, other.fit, self.base) for other in kept):
                 kept.append(hypothesis)
         return kept[: self.base.settings.search.grown_from]
 
     def holds(self, answer: Hypothesis | None, settled: Hypothesis | None) -> bool:
-        """Whether an answer holds in whole runs, so that these need no view of their own.
+        """Whether an answer holds in whole runs, so that no view of whole runs is needed.
 
         Args:
             answer: fitted in the view; None: the answer is not a fitted set.
-            settled: the same, fitted to whole runs.
+            settled: the same answer, fitted to whole runs.
         """
         del answer, settled
         return True
 
     def for_whole_runs(self, likely: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
-        """Likely sets fitted to whole runs, where these show noise beside one that the view cannot show."""
+        """The likely sets fitted to whole runs if these show scatter or a random moment, and the view cannot."""
         del likely
         return ()
 

@@ -1,8 +1,8 @@
 """Chance differences between runs: a layer under every set of causes.
 
-A wind speed, a spring or a damping that differs slightly from run to run is not a cause among others. Under every
-set, every run has its own deviations, with a normal prior of the likeliest width for the set. They are integrated
-out where sets are compared (docs/decisions/0036-runs-that-do-not-repeat.md).
+A wind speed, a spring or a damping that differs slightly from run to run is not a cause among others. Beside
+any set of causes every run has deviations. Their prior is normal, with the most likely width for the set. They
+are integrated out where sets are compared (docs/decisions/0036-runs-that-do-not-repeat.md).
 """
 
 from __future__ import annotations
@@ -29,24 +29,25 @@ WIDTHS_SETTLED: Final = 1.0
 """Drop of −2 ln L above which a fit is repeated with new widths of the scatter, in χ². Convention. A smaller
 change is insignificant."""
 
-_ROUNDS = 3  # of widths and fits
-_REPEATING = 8  # iterations of a fit to runs that repeat: it is close where they do
-_FEWEST = 3  # runs that may differ: one difference gives a width to within a factor of 16 only
-_IN_ORDER = 5  # runs that show an order
+_ROUNDS = 3  # rounds of widths and fits
+_REPEATING = 8  # iterations of a fit to runs that repeat, which starts close
+# minimum number of runs that may differ: one difference gives a width to within a factor of 16 only
+_FEWEST = 3
+_IN_ORDER = 5  # minimum number of runs that show an order
 
-_TOLERANCE = 1e-7  # drop of χ², as a share of it, at which the answer's fit has converged
+_TOLERANCE = 1e-7  # drop of χ², as a share of χ², at which the answer's fit has converged
 
 
 def may_scatter(kinds: Sequence[type[Effect]], data: Data) -> tuple[type[BetweenRuns], ...]:
-    """The differences that the runs could show: at least three runs have the quantity, and a spring."""
+    """The differences that the runs could show: at least three runs have the quantity and a spring."""
     return tuple(kind for kind in data.model.may_scatter(kinds) if data.acts(kind).sum() >= _FEWEST)
 
 
 def with_deviations(problem: Problem, point: Point, scatter: Scatter) -> tuple[Problem, Point]:
-    """A problem with chance differences between runs, and a point of it without any.
+    """A problem with chance differences between runs, and a point of it with all deviations zero.
 
     Args:
-        problem: without such differences.
+        problem: a problem without such differences.
     """
     layered = replace(problem, scatter=scatter)
     first = len(problem.parameters.own) - problem.parameters.of_effects
@@ -63,64 +64,64 @@ def without_deviations(fitted: Fit) -> tuple[Problem, Point]:
     return replace(fitted.problem, scatter=()), Point(fitted.point.common, fitted.point.per_run[:, kept])
 
 
-def chance(found: Fit, kind: type[BetweenRuns], width: float) -> Chance:
+def chance(fitted: Fit, kind: type[BetweenRuns], width: float) -> Chance:
     """A chance difference beside the nominal model as fitted.
 
     Args:
-        width: of the runs' deviations, relative, dimensionless.
+        width: relative width of the runs' deviations, dimensionless.
     """
-    run = found.problem.stated(found.point.common, found.point.per_run[0], found.problem.data.runs[0])
+    run = fitted.problem.stated(fitted.point.common, fitted.point.per_run[0], fitted.problem.data.runs[0])
     return Chance(kind, width, run.derivatives, run.mechanical_damping)
 
 
-def usual(found: Fit, kind: type[BetweenRuns]) -> Chance:
+def usual(fitted: Fit, kind: type[BetweenRuns]) -> Chance:
     """A chance difference of usual width."""
-    return chance(found, kind, kind.parameters()[0].scale)
+    return chance(fitted, kind, kind.parameters()[0].scale)
 
 
-def as_stated(found: Fit, kinds: Sequence[type[Effect]]) -> Fit:
-    """A fit whose runs differ as much as the campaign states; unchanged where it states nothing.
+def as_stated(fitted: Fit, kinds: Sequence[type[Effect]]) -> Fit:
+    """A fit with the scatter that the campaign states; unchanged if it states none.
 
     Args:
-        found: a fit whose runs repeat exactly.
+        fitted: a fit to runs that repeat exactly.
         kinds: the effects that may be named.
     """
-    known = found.problem.data.repeatability
-    stated = [kind for kind in may_scatter(kinds, found.problem.data) if known.get(kind.scatters, 0.0) > 0.0]
+    known = fitted.problem.data.repeatability
+    stated = [kind for kind in may_scatter(kinds, fitted.problem.data) if known.get(kind.scatters, 0.0) > 0.0]
     if not stated:
-        return found
-    scatter = tuple(chance(found, kind, known[kind.scatters]) for kind in stated)
-    return try_fit(*with_deviations(found.problem, found.point, scatter)) or found
+        return fitted
+    scatter = tuple(chance(fitted, kind, known[kind.scatters]) for kind in stated)
+    return try_fit(*with_deviations(fitted.problem, fitted.point, scatter)) or fitted
 
 
-def scattered(found: Fit, kinds: Sequence[type[Effect]]) -> Fit | None:
-    """A fit whose runs differ by chance, and more than stated; None where they do not, or the fit fails.
+def scattered(fitted: Fit, kinds: Sequence[type[Effect]]) -> Fit | None:
+    """A fit with more scatter than stated; None where the runs do not show it, or the fit fails.
 
     Args:
-        found: a fit whose runs differ as much as stated.
+        fitted: a fit with the stated scatter.
         kinds: the effects that may be named.
     """
-    able = may_scatter(kinds, found.problem.data)
+    able = may_scatter(kinds, fitted.problem.data)
     if not able:
         return None
-    scatter = tuple(usual(found, kind) for kind in able)
-    problem, point = with_deviations(*without_deviations(found), scatter)
+    scatter = tuple(usual(fitted, kind) for kind in able)
+    problem, point = with_deviations(*without_deviations(fitted), scatter)
     jacobian = sensitivities(problem, point)
     if not all(np.all(np.isfinite(c)) and np.all(np.isfinite(r)) for c, r in jacobian):
         return None
-    residuals = found.residuals if not found.problem.scatter else scaled_residuals(problem, point)
+    residuals = fitted.residuals if not fitted.problem.scatter else scaled_residuals(problem, point)
     columns, prior = ScatterColumns.of(problem, point, residuals, jacobian), width_prior(problem)
-    if not _evident(columns, prior, np.ones(len(able), bool), found.settings.scatter):
+    if not _evident(columns, prior, np.ones(len(able), bool), fitted.settings.scatter):
         return None
     layered = try_fit(with_widths(problem, columns.likeliest(prior)), point)
     return None if layered is None else with_likeliest_widths(layered)
 
 
 def differing(fitted: Fit, places: Sequence[int], kinds: Sequence[type[Effect]]) -> Fit | None:
-    """Some runs of a fit, refitted with deviations as wide as they may be; None where they may not differ.
+    """Some runs of a fit, refitted with the widest possible deviations; None where they may not differ.
 
     Args:
-        places: of these runs.
+        places: places of these runs.
         kinds: the effects that may be named.
     """
     problem, point = without_deviations(fitted)
@@ -131,12 +132,15 @@ def differing(fitted: Fit, places: Sequence[int], kinds: Sequence[type[Effect]])
 
 
 def with_own_linear_terms(fitted: Fit, kinds: Sequence[type[Effect]]) -> tuple[Problem, Point] | None:
-    """The problem of a fit with deviations of every run as wide as they may be, at the fit's point.
+    """The problem of a fit with the widest possible deviations of every run, at the fit's point.
 
-    A run then says of an effect only what its spring and damping do not; None where the runs may not differ.
+    With these deviations, a run determines only the part of an effect that its spring and damping cannot imitate.
 
     Args:
         kinds: the effects that may be named.
+
+    Returns:
+        The problem and the point; None if the runs may not differ.
     """
     widest = _with_widest(*without_deviations(fitted), fitted, kinds)
     return None if widest is None else (widest[0], _same_deviations(*widest, fitted))
@@ -145,7 +149,7 @@ def with_own_linear_terms(fitted: Fit, kinds: Sequence[type[Effect]]) -> tuple[P
 def _with_widest(
     problem: Problem, point: Point, fitted: Fit, kinds: Sequence[type[Effect]]
 ) -> tuple[Problem, Point] | None:
-    """A problem without deviations, with the widest ones that its runs may have; None where they have none."""
+    """A problem without deviations, with the widest that its runs may have added; None where they have none."""
     data = problem.data
     able = tuple(usual(fitted, kind) for kind in data.model.may_scatter(kinds) if data.acts(kind).any())
     if not able:
@@ -156,7 +160,7 @@ def _with_widest(
 
 
 def _same_deviations(problem: Problem, point: Point, fitted: Fit) -> Point:
-    """A point with the deviations of a fit, of the numbers that it has."""
+    """A point with the deviations of a fit, for the quantities that both have."""
     names, release = fitted.problem.parameters.own_names, point.per_run.copy()
     for place, name in enumerate(problem.parameters.own_names):
         if name in names:
@@ -165,22 +169,22 @@ def _same_deviations(problem: Problem, point: Point, fitted: Fit) -> Point:
 
 
 def evident(fitted: Fit) -> Fit:
-    """A fit with chance differences where its runs show more than stated; else as stated."""
+    """A fit with chance differences if its runs show more than stated; else as stated."""
     scatter, known = fitted.problem.scatter, fitted.problem.data.repeatability
     if shown := shown_by(fitted):
         widths = fitted.columns.likeliest(width_prior(fitted.problem)).widths
-        found = [
+        widened = [
             replace(one, width=float(width), shown=one.name in shown)
             for one, width in zip(scatter, widths, strict=True)
         ]
     else:
         stated = [(one, known.get(one.kind.scatters, 0.0)) for one in scatter]
-        found = [replace(one, width=width, shown=False) for one, width in stated if width > 0.0]
-    return with_scatter(fitted, tuple(found))
+        widened = [replace(one, width=width, shown=False) for one, width in stated if width > 0.0]
+    return with_scatter(fitted, tuple(widened))
 
 
 def shown_by(fitted: Fit) -> tuple[str, ...]:
-    """The unstated chance differences that the runs of a fit show, by name; empty where they repeat."""
+    """Names of the unstated chance differences that the runs of a fit show; empty where the runs repeat."""
     scatter, chosen = fitted.problem.scatter, fitted.settings.scatter
     if not scatter:
         return ()
@@ -192,16 +196,16 @@ def shown_by(fitted: Fit) -> tuple[str, ...]:
 
 
 def _shown(columns: ScatterColumns, prior: WidthPrior, chosen: ScatterSettings) -> Kept:
-    """The numbers in which the runs differ, found by removing the least needed one repeatedly."""
-    kept = np.ones(prior.usual.size, bool)
-    while kept.sum() > 1:
-        places = np.flatnonzero(kept)
-        gains = [_gain(columns, prior, kept, np.arange(kept.size) == place) for place in places]
+    """The quantities that differ between the runs; the least needed one is removed repeatedly."""
+    varying = np.ones(prior.usual.size, bool)
+    while varying.sum() > 1:
+        places = np.flatnonzero(varying)
+        gains = [_gain(columns, prior, varying, np.arange(varying.size) == place) for place in places]
         least = int(np.argmin(gains))
         if gains[least] >= chdtri(1.0, chosen.which_scatters_rate):
             break
-        kept[places[least]] = False
-    return kept
+        varying[places[least]] = False
+    return varying
 
 
 def drifting(fitted: Fit) -> Between | None:
@@ -224,10 +228,10 @@ def drifting(fitted: Fit) -> Between | None:
 
 
 def drifts(fitted: Fit, place: int) -> bool:
-    """Whether the runs differ in one number in proportion to their place, and in no other.
+    """Whether the runs differ in one quantity in proportion to their place, and in no other.
 
     Args:
-        place: of the number among the numbers that differ in the fit.
+        place: place of the quantity among those that differ in the fit.
     """
     columns, prior, chosen = fitted.columns, width_prior(fitted.problem), fitted.settings.scatter
     beside, _ = columns.with_drift(place)
@@ -257,7 +261,7 @@ def _evident(columns: ScatterColumns, prior: WidthPrior, which: Kept, chosen: Sc
 
 
 def _gain(columns: ScatterColumns, prior: WidthPrior, kept: Kept, lost: Kept) -> float:
-    """Drop of −2 ln L by some of the differences beside the others that are kept."""
+    """Drop of −2 ln L by some of the differences beside the remaining ones."""
     whole = columns.likeliest(_held(prior, ~kept))
     without = columns.likeliest(_held(prior, ~kept | lost))
     return without.likeliest.restricted - whole.likeliest.restricted
@@ -270,7 +274,7 @@ def _held(prior: WidthPrior, at_least: Kept) -> WidthPrior:
 
 
 def with_likeliest_widths(fitted: Fit, *, rounds: int = _ROUNDS) -> Fit:
-    """A fit whose widths are the likeliest for its residuals; unchanged where it has no such differences."""
+    """A fit with the most likely widths for its residuals; unchanged if it has no such differences."""
     for _ in range(rounds):
         between = fitted.between
         if between is None:
@@ -287,13 +291,13 @@ def with_likeliest_widths(fitted: Fit, *, rounds: int = _ROUNDS) -> Fit:
 
 
 def likelier(fitted: Fit, repeating: Fit | None = None) -> Fit:
-    """A fit, or the likelier one that starts from runs that repeat exactly.
+    """The given fit, or a more likely fit started from runs that repeat exactly.
 
-    Wide deviations hide much of an effect's change between runs, so a fit from them may end in another minimum.
+    Wide deviations hide most of an effect's change between runs, so a fit from them may end in another minimum.
 
     Args:
-        fitted: a fit whose runs differ by chance.
-        repeating: a fit of the same effects to runs that repeat; None: from the values of the other.
+        fitted: a fit with scatter between its runs.
+        repeating: a fit of the same effects to runs that repeat; None: it starts from the values of ``fitted``.
     """
     if not fitted.problem.scatter:
         return fitted
@@ -304,7 +308,7 @@ def likelier(fitted: Fit, repeating: Fit | None = None) -> Fit:
     least = width_prior(fitted.problem).least
     scatter = tuple(one.as_wide_as(width) for one, width in zip(fitted.problem.scatter, least, strict=True))
     start = fit_at(*with_deviations(repeating.problem, repeating.point, scatter))
-    # no form is exact, and its error between runs needs narrow deviations
+    # no form is exact: its errors between runs look like narrow deviations
     if start.between is None or not start.between.likelihood < fitted.unlikelihood:
         return fitted
     again = try_fit(with_widths(start.problem, start.between), start.point)

@@ -43,9 +43,9 @@ class Sets:
         hypotheses: sets of effects fitted in it.
         random: sets with a random moment that passed its tests.
         rivals: causes from outside the vocabulary, weighed beside the sets.
-        refused: by names of refused answers, the reason: effects that the runs do not confirm.
-        unexplained_floor: the least share of the gap that all effects together leave, where that ended the search;
-            else None.
+        refused: the reason for each refused answer, by its names: effects that the runs do not confirm.
+        unexplained_floor: the share of the gap that all effects together leave, if that ended the search; else
+            None.
         confirmed: the answer fitted to whole runs, with every effect confirmed by the runs; None where the answer
             is not a fitted set, or is not confirmed yet.
     """
@@ -65,7 +65,7 @@ class Sets:
         sets = [self._fitted_set(one) for one in (*self.hypotheses, *self.random)]
         outside = (one for rival in self.rivals for one in rival.hypotheses)
         sets += [one.fitted_set(self.view.repeating, nominal, outside=True) for one in outside]
-        if prepared.read_off:  # it may be the only cause, and is part of the gap
+        if prepared.read_off:  # a cause detected in the records may be the only one, and is part of the gap
             sets.append(FittedSet((), 1.0, nominal.excess, scatter_cost=nominal.scatter_cost))
         nominal = replace(nominal, chi2=nominal.chi2 + prepared.hum_power(base))
         own = self.view.left_by_read_off
@@ -77,7 +77,7 @@ class Sets:
         """The set as input of the weighing.
 
         A drift in the order of the runs is neither scatter nor an effect of the vocabulary; it costs as much as
-        one.
+        an effect.
         """
         drift = None if one.effects else drifting(one.fit)
         found = one.fitted_set(self.view.repeating, self.view.gap, outside=drift is not None)
@@ -87,12 +87,12 @@ class Sets:
         return replace(found, scatter_cost=cost)
 
     def fitted(self, names: Sequence[str]) -> Hypothesis | None:
-        """The set of these effects; None where they were not fitted together."""
+        """The set of these effects; None if they were not fitted together."""
         key = tuple(sorted(names))
         return next((h for h in self.hypotheses if h.names == key), None)
 
     def at_random(self, names: Names, steady: Hypothesis | None) -> Hypothesis | None:
-        """The set of these causes with a random moment; None where none qualifies, or they explain more without it.
+        """The set of these causes with a random moment; None if there is none, or they explain more without it.
 
         Args:
             names: sorted.
@@ -119,23 +119,23 @@ class Sets:
 
     @property
     def answer(self) -> Hypothesis | None:
-        """The set that is the answer; None where that is not a fitted set, or includes a random moment."""
+        """The set that is the answer; None if the answer is not a fitted set, or includes a random moment."""
         names = self.weighed[0].effects
         found = self.fitted(names)
         return found if self.at_random(names, found) is None else None
 
     def without(self, names: Names, reason: Fact | None) -> Sets:
-        """The sets without one that the runs do not confirm.
+        """The sets without one set that the runs do not confirm.
 
         Args:
-            names: of the set, sorted.
-            reason: of the refusal; None where the set cannot be fitted to whole runs.
+            names: names of the set, sorted.
+            reason: reason for the refusal; None where the set cannot be fitted to whole runs.
         """
         kept = tuple(h for h in self.hypotheses if h.names != names)
         return replace(self, hypotheses=kept, refused=self._refused(names, reason))
 
     def without_moment(self, refused: Hypothesis, reason: Fact) -> Sets:
-        """The sets without one whose random moment the runs do not confirm."""
+        """The sets without one set with a random moment that the runs do not confirm."""
         kept = tuple(one for one in self.random if one is not refused)
         return replace(self, random=kept, refused=self._refused(refused.names, reason))
 
@@ -149,7 +149,7 @@ class Sets:
         if self.confirmed is not None:
             at_random = any(one.names == names for one in self.random)
             found[names] = whole = self.confirmed if at_random else self.view.finished(self.confirmed)
-            # its parts are compared with it, with the chance differences between runs of the answer
+            # the parts are compared with the answer, with the answer's chance differences between runs
             parts = {key: part for key, part in found.items() if part is not None and key != names}
             for key, part in parts.items():
                 found[key] = replace(part, fit=with_scatter(part.fit, whole.fit.problem.scatter))
@@ -160,7 +160,7 @@ def with_near_rivals(sets: Sets, rivals: Sequence[Rival], clock: StepClock) -> S
     """Add near rivals; drop sets that the runs do not confirm.
 
     Args:
-        rivals: from outside the vocabulary.
+        rivals: causes from outside the vocabulary.
     """
     sets = _with_near_sets(sets, clock)
     with clock.step("pruning"):
@@ -178,14 +178,14 @@ def _with_near_sets(sets: Sets, clock: StepClock) -> Sets:
     """Add every set with one effect less than the answer, or with an equivalent effect."""
     pruned, view = set[Names](), sets.view
     while (best := sets.best) is not None and len(best.effects) > 1 and best.names not in pruned:
-        pruned.add(best.names)  # a part of it may be the answer now
+        pruned.add(best.names)  # a part of the answer may be the answer now
         with clock.step("pruning"):
             by_name = {h.names: h for h in (*sets.hypotheses, *prune(best, sets.hypotheses))}
             known = tuple(by_name.values())
             sets = replace(sets, hypotheses=(*known, *exchange(best, known, view.base)))
     if not pruned:
         return sets
-    with clock.step("forms"):  # of rival sets, freed where that pays: growth frees the forms of few sets
+    with clock.step("forms"):  # forms of rival sets are freed, too: growth frees the forms of few sets
         near = [w.effects for w in sets.weighed if w.effects != UNKNOWN and w.probability > RIVAL_FORMS]
         if len(near) < 2:
             return sets
@@ -216,12 +216,12 @@ def resolved(sets: Sets) -> Sets:
 
 
 def prune(whole: Hypothesis, found: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """The hypotheses with one effect less than a given one that are not fitted yet, or not with its forms.
+    """Sets with one effect less than a given set that are not fitted yet, or not with its forms.
 
     Growth frees the forms of few sets. A set may owe its fit to the form of one effect, and not to another effect.
 
     Returns:
-        The new ones, each started from the values of the whole.
+        The new sets, each started from the values of the whole set.
     """
     known = {hypothesis.names: hypothesis.fit for hypothesis in found}
     smaller = []
@@ -250,7 +250,7 @@ def exchange(whole: Hypothesis, found: Sequence[Hypothesis], nominal: Fit) -> li
         found: fitted hypotheses, among them all with one effect less than ``whole``.
 
     Returns:
-        Those that are not fitted yet. Two effects are alike where the fits of each alone are.
+        The sets that are not fitted yet. Two effects are alike if their fits alone are.
     """
     by_name = {hypothesis.names: hypothesis for hypothesis in found}
     alone = {h.effects[0]: h for h in found if len(h.effects) == 1}
@@ -265,7 +265,7 @@ def exchange(whole: Hypothesis, found: Sequence[Hypothesis], nominal: Fit) -> li
             and same_change(h.fit, alone[name].fit, nominal)
         ]
         if others in by_name:
-            for child in sets_with_one_more([by_name[others]], alike):  # converged, as its rival is
+            for child in sets_with_one_more([by_name[others]], alike):  # converged, like its rival
                 fitted = None if child.fit.converged else try_fit(child.fit.problem, child.fit.point)
                 sets.append(child if fitted is None else replace(child, fit=fitted))
     return sets

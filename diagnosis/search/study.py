@@ -28,9 +28,9 @@ from diagnosis.where.place import Place
 from tunnel_sim.vocabulary.campaign import Campaign
 
 NOISE_EXPLAINS: Final = 1.0
-"""Maximum gap that irregular noise explains completely. Judgement. The noise variance itself."""
+"""Maximum gap that irregular noise may explain completely. Judgement. The noise variance itself."""
 SHARES_CHANCE: Final = 1.0
-"""Standard deviation of the explained share of the gap above which the shares of all sets are chance.
+"""Standard deviation of the explained share of the gap above which the shares of all sets count as chance.
 Convention. As large as the gap itself."""
 NOISE_EXCUSED: Final = 0.8
 """Explained share of a gap this small above which irregular noise is not its cause. Judgement (decision
@@ -45,8 +45,8 @@ class Gap:
     """Whether there is a gap, and where.
 
     Args:
-        test: whether there is one, after the hum is removed.
-        place: where it is, from the residuals alone; None where there is none.
+        test: whether there is a gap, after the hum is removed.
+        place: place of the gap, from the residuals alone; None if there is no gap.
     """
 
     test: GapTest
@@ -61,15 +61,15 @@ class Study:
         prepared: the campaign before any effect is fitted.
         gap: whether there is a gap, and where.
         answers: the answer first, then the most probable ones; empty without a gap.
-        refused: by names of refused answers, the reason: effects that the runs do not confirm.
-        needless: effects of the likeliest set that do not reduce the residual on held-out readings.
+        refused: the reason for each refused answer, by its names: effects that the runs do not confirm.
+        needless: effects of the most likely set that do not reduce the residual on held-out readings.
         rivals: causes weighed from outside the vocabulary.
         disturbed: disturbed runs, which are left out from the disturbance on.
-        between_runs: for an unknown cause, the nominal fit to runs that differ; None where they do not.
+        between_runs: for an unknown cause, the nominal fit to runs that differ; None where they repeat.
         caution: key of the caution about answers found in the view of the runs; empty: none.
-        unexplained_floor: the least share of the gap that all effects together leave, where that ended the search;
-            else None.
-        single: by effect of the answer that one run alone can show, that run.
+        unexplained_floor: the share of the gap that all effects together leave, if that ended the search; else
+            None.
+        single: by effect of the answer that only one run can show, that run.
         seconds: wall time by step, s.
     """
 
@@ -134,8 +134,8 @@ class Study:
     def named_beside(self, answer: Answer) -> Names:
         """Causes other than the fitted effects of an answer: detected in the records, or differences between runs.
 
-        The differences are its own. An answer that was fitted to runs that repeat has the differences of the first
-        answer.
+        The differences belong to the answer. An answer fitted to runs that repeat takes the differences of the
+        first answer.
         """
         fit = None if answer is self.answer else answer.fit
         if fit is None or not fit.problem.scatter:
@@ -179,15 +179,15 @@ class Study:
         return None if self.answer is None else self.answer.moment
 
     def of(self, effects: Collection[str]) -> Answer | None:
-        """The answer of these effects; None where they were not weighed."""
+        """The answer of these effects; None if they were not weighed."""
         key = tuple(sorted(effects))
         return next((answer for answer in self.answers if answer.effects == key), None)
 
     def of_part(self, names: Names) -> Study:
-        """The study without its answer and the sets that contain it; the new answer is a part of the old one.
+        """The study without its answer and the sets that contain it; a part of the old answer becomes the answer.
 
-        The others keep their odds. ``unknown`` is the answer where it is more probable than all sets together, or
-        the part was not weighed.
+        The other sets keep their odds. ``unknown`` is the answer where it is more probable than all sets
+        together, or the part was not weighed.
 
         Args:
             names: of the part, sorted.
@@ -208,10 +208,10 @@ class Study:
 
     @classmethod
     def of_sets(cls, sets: Sets, gap: Gap, clock: StepClock) -> Study:
-        """The study whose answers are sets; the first of them and its parts are fitted to whole runs.
+        """The study with sets as its answers; the first set and its parts are fitted to whole runs.
 
         Args:
-            sets: of the last view.
+            sets: the sets of the last view.
         """
         prepared = sets.view.prepared
         with clock.step("polishing"):
@@ -238,7 +238,7 @@ class Study:
 
 
 def _less_certain(answers: Sequence[Answer]) -> list[Answer]:
-    """The answers where one run alone shows an effect of the first: that run may be odd, and its cause unknown."""
+    """The answers, if only one run shows an effect of the first: that run may be odd, or its cause unknown."""
     first, *others = answers
     share = 0.0 if first.hypothesis is None else first.hypothesis.fit.settings.selection.odd_share
     doubt = share * first.probability
@@ -255,7 +255,7 @@ def _with_fits(answer: Answer, sets: Sets, whole: Mapping[Names, Hypothesis | No
     """An answer with its fits.
 
     Args:
-        whole: sets fitted to whole runs, by names; None where that failed.
+        whole: sets fitted to whole runs, by names; None where the fit failed.
     """
     names = answer.effects
     in_view = sets.fitted(names)
@@ -268,7 +268,7 @@ def _with_fits(answer: Answer, sets: Sets, whole: Mapping[Names, Hypothesis | No
 
 
 def _excused(sets: Sets, test: GapTest) -> Sequence[Answer]:
-    """The answers; where noise explains the gap, the causes detected in the records, or else none."""
+    """The answers; if noise explains the gap, only the causes detected in the records, or ``none``."""
     weighed, prepared = sets.weighed, sets.view.prepared
     if not sets.view.may_be_noise or not noise_explains(prepared.nominal, test, weighed):
         return weighed
@@ -278,9 +278,9 @@ def _excused(sets: Sets, test: GapTest) -> Sequence[Answer]:
 
 
 def noise_explains(nominal: Fit, test: GapTest, weighed: Sequence[Answer]) -> bool:
-    """Whether misbehaving noise may be the whole of a small gap, or the shares of the gap are chance.
+    """Whether irregular noise may explain a whole small gap, or the shares of the gap are chance.
 
-    Effects with few parameters explain little of any noise, however it misbehaves.
+    Effects with few parameters explain little of any noise, however irregular.
     """
     small = test.noisy and nominal.excess < NOISE_EXPLAINS * nominal.problem.data.mean_block
     closed = any(w.effects != UNKNOWN and w.share < 1.0 - NOISE_EXCUSED for w in weighed)
@@ -300,10 +300,10 @@ def _choices(answer: Answer, sets: Sets) -> tuple[Choice, ...]:
 
 
 def _gap_beside(fit: Fit, *known: Fit) -> ChannelMisfit | None:
-    """Misfit of the nominal model to the readings of a fit, in their noise; None where its fit fails.
+    """Misfit of the nominal model to the readings of a fit, in the fit's noise; None where its fit fails.
 
     Args:
-        known: fits of the nominal model, the first of them to whole runs.
+        known: fits of the nominal model; the first of them is a fit to whole runs.
     """
     data = fit.problem.data
     for base in known:

@@ -1,8 +1,8 @@
 """Whether a cause survives the loss of a run.
 
-A cause acts in every run that could show it. An effect that only repairs one odd run loses its size without that
-run, although the others determine it. A random moment beside effects that fit worse than none explains more than
-the nominal model leaves in its runs.
+A cause acts in every run that could show it. An effect that only repairs one odd run loses its size without
+that run, although the other runs determine it. A random moment beside badly fitting effects explains more than
+the gap of the nominal model in its runs.
 """
 
 from __future__ import annotations
@@ -22,33 +22,32 @@ from diagnosis.search.resolved import unresolved
 from tunnel_sim.vocabulary.record import Array
 
 EXPLAINS_MOST: Final = 1.5
-"""Maximum drop of −2 ln L by a random moment, as a multiple of the χ² beyond noise that the nominal model
-leaves in its runs. Judgement. The release of a run absorbs part of a random motion, and the nominal model all
-that it can; a half is allowed for both."""
+"""Maximum drop of −2 ln L by a random moment, as a multiple of the nominal model's χ² beyond noise in the same
+runs. Judgement. The release of a run absorbs a part of a random motion, and the nominal model as much as it
+can; a half is allowed for both."""
 EXPLAINS_ALONE: Final = 3.0
-"""This limit for a random moment without effects beside it. Judgement. The nominal model and the releases may
-absorb two thirds of a random motion of few cycles. In two campaigns where a moment acts alone the drop is
-1.54 and 1.61; no campaign shows where the limit fails."""
+"""This limit for a random moment without effects. Judgement. The nominal model and the releases may absorb two
+thirds of a random motion of few cycles. In two campaigns where only a moment acts the drop is 1.54 and 1.61; no
+campaign shows where the limit fails."""
 EXPLAINS_STDS: Final = 4.0
-"""Margin of χ² of noise over that maximum, in standard deviations. Convention. One campaign in 30,000."""
+"""Margin of χ² over that maximum due to noise, in standard deviations. Convention. One campaign in 30,000."""
 
 SURVIVES_SIZE: Final = 0.5
-"""Minimum size of an effect without any one run that the others could replace, as a share of its size.
+"""Minimum size of an effect when any one replaceable run is left out, as a share of its size from all runs.
 Convention. The other runs then confirm more than half of it."""
 SURVIVES_STDS: Final = 3.0
-"""Minimum standard deviations by which the other runs must miss that size; and minimum size of an effect for
-them to show it. Convention. One of 700 runs misses it by chance."""
+"""Minimum distance between the whole size and that limit, in standard deviations from the other runs; and
+minimum size of an effect for them to show it. Convention. One of 700 runs misses it by chance."""
 SURVIVES_EXCESS: Final = 1.0
-"""Maximum excess of a fit without a run, as a ratio to the noise variance, for it to contradict the size of
-an effect. Judgement. A residual as large as the noise. A fit that leaves more is not a model of the other
-runs."""
+"""Maximum excess of a fit without a run, in noise variances, for it to contradict the size of an effect.
+Judgement. A residual as large as the noise. With a larger residual the fit is not a model of the other runs."""
 
 
 def refusal(answer: Hypothesis, repeating: Fit) -> Fact | None:
-    """Why a set is not an answer; None where every cause of it is confirmed.
+    """The reason why a set is not an answer; None where every cause in it is confirmed.
 
     Args:
-        answer: fitted to whole runs.
+        answer: the set, fitted to whole runs.
         repeating: fit of the nominal model to runs that repeat.
     """
     whole: Fit | None = answer.fit
@@ -68,7 +67,7 @@ def refusal(answer: Hypothesis, repeating: Fit) -> Fact | None:
 
 
 def _beside(answer: Hypothesis, process: ProcessNoise) -> Fit | None:
-    """The effects of a set in the noise of its random moment; None where there are none, or it does not settle."""
+    """The effects of a set in the noise of its random moment; None if it has none, or the noise fails to settle."""
     noisy = with_response(answer.fit, process.spectrum) if answer.effects else None
     if noisy is None:
         return None
@@ -79,10 +78,11 @@ def _beside(answer: Hypothesis, process: ProcessNoise) -> Fit | None:
 
 
 def explains_too_much(process: ProcessNoise, repeating: Fit, *, alone: bool = False) -> bool:
-    """Whether a random moment explains more than the nominal model leaves in the runs in which it acts.
+    """Whether a random moment explains more than the gap of the nominal model in the runs in which it acts.
 
-    The effects beside it then fit these runs worse than no effect, and the moment pays for them. A moment alone has
-    no effect to pay for: only what the nominal model absorbs of a random motion is not left.
+    If it does, the effects beside it fit these runs worse than the nominal model, and the moment compensates. A
+    moment alone has no effects to compensate; it exceeds the gap only by the random motion that the nominal
+    model absorbs.
     """
     left, freedom = 0.0, 0
     for run, residual in zip(repeating.problem.data.runs, repeating.residuals, strict=True):
@@ -95,10 +95,10 @@ def explains_too_much(process: ProcessNoise, repeating: Fit, *, alone: bool = Fa
 
 
 def contradicted(whole: Fit) -> dict[str, str]:
-    """The effects that lose their size without a run, although the others could show it, with that run.
+    """The effects that lose their size without a run although the others could show it, each with that run.
 
-    Linear theory finds them, and a fit without the run confirms it. That fit explains the other runs: where more
-    than the noise remains in them, sizes depend on the runs in any case.
+    Linear theory finds them, and a fit without the run confirms them. The fit must explain the other runs: if
+    more than the noise remains in them, sizes depend on the runs in any case.
     """
     found = dict[str, str]()
     for name, full, sizes, could in _without_each(whole):
@@ -115,7 +115,7 @@ def contradicted(whole: Fit) -> dict[str, str]:
 
 
 def shown_by_one(whole: Fit) -> dict[str, str]:
-    """The effects that only one run can show, with that run."""
+    """The effects that only one run can show, each with that run."""
     found = dict[str, str]()
     if len(whole.residuals) > 1:
         for name, _, _, could in _without_each(whole):
@@ -125,7 +125,7 @@ def shown_by_one(whole: Fit) -> dict[str, str]:
 
 
 def _without_each(whole: Fit) -> Iterator[tuple[str, str, Array, Array]]:
-    """By effect whose severity is fitted and evident, its size without each run, and the evidence for that size.
+    """For each fitted and evident effect, its size without each run, and the evidence for that size.
 
     Returns:
         Name, full name of the severity, the size relative to the size from all runs, shape (runs,), and the size of

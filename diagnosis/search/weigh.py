@@ -32,9 +32,9 @@ def weigh(
     """Probabilities of the answers.
 
     Args:
-        sets: fitted sets of effects; of two with the same effects the better one counts.
+        sets: fitted sets of effects; of two with the same effects the better set counts.
         nominal: misfit of the nominal model, with the same chance differences between runs as the sets.
-        whole: misfit of the nominal model without them; None: there are none.
+        whole: misfit of the nominal model without chance differences; None: the sets have none.
 
     Returns:
         All answers, ``unknown`` among them: the answer first, then the most probable ones. ``unknown`` competes

@@ -1,7 +1,7 @@
 """Weights of fitted sets of effects (docs/decisions/0007-how-causes-are-weighed.md).
 
 Real effects never have exactly a textbook form, and at the rig's signal-to-noise ratio every form error is
-significant. Sets are therefore weighed by the misfit in every channel of the residuals relative to a scale.
+significant. Sets are therefore weighed by the misfit in every channel of the residuals, relative to a scale.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit
 from diagnosis.settings import WeighingSettings
 from tunnel_sim.vocabulary.record import Array
 
-#: The channels with leakage where sets are compared, 1 or 0, shape (6,): a phase error, squared, is an amplitude
-#: error. A misfit of the zero or of the harmonics is not a phase error.
+#: Channels into which other channels leak when sets are compared, 1 or 0, shape (6,): a phase error, squared,
+#: is an amplitude error. A misfit of the zero or of the harmonics is not a phase error.
 OF_MOTION = np.array([0.0 if name in ("zero", "harmonics") else 1.0 for name in CHANNELS])
-#: The channels with leakage for the odds against ``unknown``: all, as in the regression.
+#: Channels into which others leak, for the odds against ``unknown``: all channels, as in the regression.
 ALL_CHANNELS = np.ones(len(CHANNELS))
 
 
@@ -31,9 +31,9 @@ class FittedSet:
         share: unexplained share of the gap, a fraction; below 0 by chance.
         excess: χ² beyond noise by channel, shape (6,), dimensionless.
         numbers: number of further parameters: freed forms and instants, less two where gravity replaces a spring.
-        outside: whether it is from outside the vocabulary: its probability is added to ``unknown``.
-        scatter_cost: −2 ln of the evidence of its chance differences between runs, dimensionless.
-        shown_between_runs: number of its effects that only the comparison of runs shows.
+        outside: whether the set is from outside the vocabulary; its probability is then added to ``unknown``.
+        scatter_cost: −2 ln of the evidence of the set's chance differences between runs, dimensionless.
+        shown_between_runs: number of effects in the set that only the comparison of runs shows.
     """
 
     effects: tuple[str, ...]
@@ -48,8 +48,8 @@ class FittedSet:
 def least_excess(excesses: Sequence[Array]) -> Array:
     """The least misfit of any set by channel, at most 0, shape (6,).
 
-    The contribution of chance is common to all sets, because they are fitted to the same noise; only differences
-    count.
+    The contribution of chance is common to all sets, because they are fitted to the same noise; only
+    differences between sets count.
 
     Args:
         excesses: χ² beyond noise, each of shape (6,).
@@ -58,7 +58,7 @@ def least_excess(excesses: Sequence[Array]) -> Array:
 
 
 def common_misfit(excesses: Sequence[Array]) -> float:
-    """The largest χ² beyond noise of a channel that remains under every set: a model error that no set explains.
+    """The largest χ² beyond noise of a channel that remains in every set: a model error that no set explains.
 
     Args:
         excesses: χ² beyond noise, each of shape (6,).
@@ -74,14 +74,15 @@ def misfit_scale(
 ) -> Array:
     """χ² by channel that needs no cause, shape (6,).
 
-    Beside chance it allows a model error: a share of the amplitude of the gap in the same channel, since no real
-    effect has its textbook form, or the common misfit of all sets if that is larger, up to a share of the motion.
-    An error of the frequency must not hide a cause in the damping. Where the runs differ by chance, chance alone is
-    also an answer, and the likelihood decides between them: the weight of a small χ² is half of it.
+    It allows for chance and for a model error. The model error is a share of the amplitude of the gap in the
+    same channel, since no real effect has its textbook form; or the common misfit of all sets if that is
+    larger, up to a share of the motion. An error of the frequency must not hide a cause in the damping. Where
+    the runs differ by chance, chance alone is also an answer, and the likelihood decides between them: the
+    logarithm of the weight falls by half of a small χ².
 
     Args:
         nominal: misfit of the nominal model, and the motion.
-        common: χ² of a channel that remains under every set (`common_misfit`), dimensionless.
+        common: χ² of a channel that remains in every set (`common_misfit`), dimensionless.
         chance: χ² due to chance, by channel or common to all; None: as for a superfluous effect.
     """
     needless = chosen.needless_chi2 if nominal.repeats else 2.0 * chosen.steepness
@@ -92,11 +93,11 @@ def misfit_scale(
 def error_of_form(nominal: ChannelMisfit, chosen: WeighingSettings, common: float = 0.0) -> Array:
     """χ² by channel that an effect may leave because its form is not exact, shape (6,), dimensionless.
 
-    A share of the amplitude of its gap: most of it in the channels of the gap, some of it in the others.
+    A share of the amplitude of the gap: most of it in the channels of the gap, some of it in the others.
 
     Args:
         nominal: misfit of the nominal model, and the motion.
-        common: χ² of a channel that remains under every set (`common_misfit`), dimensionless.
+        common: χ² of a channel that remains in every set (`common_misfit`), dimensionless.
     """
     by_form = chosen.form_error**2 * _leaked(nominal.excess, ALL_CHANNELS, chosen.leak)
     return np.minimum(np.maximum(by_form, common), chosen.model_error**2 * nominal.motion)
@@ -118,9 +119,10 @@ def log_weight(
         scale: from `misfit_scale`, shape (6,).
         effects: number of effects.
         numbers: number of further parameters.
-        scatter_cost: −2 ln of the evidence of its chance differences between runs, and of the nominal model's.
-            The reduction that superfluous effects may bring does not count.
-        shown_between_runs: number of effects that could reduce it: only the comparison of runs shows them.
+        scatter_cost: −2 ln of the evidence of the set's chance differences between runs, and of the nominal
+            model's. A reduction that superfluous effects may cause does not count.
+        shown_between_runs: number of effects that only the comparison of runs shows; they could reduce this
+            cost.
     """
     own, nominal = scatter_cost
     cost = min(own + chosen.needless_scatter * shown_between_runs, max(own, nominal))
@@ -129,12 +131,12 @@ def log_weight(
 
 
 def log_misfit(left: Array, scale: Array, leaking: Array, leak: float) -> float:
-    """Sum over the channels of the logarithm of the misfit, 0 where there is none.
+    """Sum over the channels of the logarithm of the misfit; 0 without a misfit.
 
     Args:
         left: χ² by channel, shape (6,), dimensionless.
         scale: from `misfit_scale`, shape (6,).
-        leaking: 1 for the channels with leakage, else 0, shape (6,): `OF_MOTION` or `ALL_CHANNELS`.
+        leaking: 1 for the channels into which others leak, else 0, shape (6,): `OF_MOTION` or `ALL_CHANNELS`.
         leak: share of the misfit in other channels that counts in a channel.
     """
     return float(np.sum(np.log1p(_leaked(left, leaking, leak) / scale)))

@@ -1,4 +1,4 @@
-"""The numbers of a diagnosis that somebody varies: one field for each decision, with its origin.
+"""The settings of a diagnosis that users vary: one field for each decision, with its origin.
 
 A field weighs answers (a probability, a prior, a price), is the false-alarm rate of a test, or fits the search to a
 campaign. Settings are arguments: `diagnosis.diagnose` takes them, and every fit has the settings of its data. Every

@@ -390,7 +390,7 @@ class WordsSettings:
 
 @dataclass(frozen=True)
 class WorkSettings:
-    """Division of the work; the answers are bit-identical with any of these."""
+    """Division of the work; the answers are bit-identical with any of these settings."""
 
     threads: int = setting(
         2,

@@ -40,11 +40,12 @@ class Backbone:
         time_s: mid-window since the start of the record, shape (n,), s.
         amplitude_rad: at mid-window, shape (n,), rad.
         frequency_hz: undamped natural frequency, shape (n,), Hz.
-        frequency_std: of each, shape (n,), Hz, widened where a window's residual is not white.
+        frequency_std: standard deviation of each frequency, shape (n,), Hz, widened where a window's residual
+            is not white.
         zeta: damping ratio, shape (n,).
-        zeta_std: of each, shape (n,).
-        nominal_frequency_hz: of the nominal model, Hz; for a body without a spring, from `resonance`.
-        nominal_zeta: of the nominal model, dimensionless.
+        zeta_std: standard deviation of each damping ratio, shape (n,).
+        nominal_frequency_hz: frequency of the nominal model, Hz; for a body without a spring, from `resonance`.
+        nominal_zeta: damping ratio of the nominal model, dimensionless.
         alone_frequency_hz: frequency of a linear fit to this run alone, Hz; None where that fails.
         alone_zeta: damping ratio of the same fit.
         alone_excess: mean squared scaled residual of that fit minus one, a ratio.
@@ -103,10 +104,10 @@ def backbones(fit: Fit) -> list[Backbone]:
 
 
 def drift(curves: list[Backbone]) -> tuple[float, float]:
-    """Departure of the curves from level: χ² beyond level lines, of frequency and of damping.
+    """Deviation of the curves from level lines: χ² of frequency and of damping.
 
-    An effect on stiffness raises the first, one on damping the second. In each window both are equally well
-    determined in ω, so they can be compared.
+    An effect on stiffness raises the first, an effect on damping the second. In units of ω, each window
+    determines both equally well, so they can be compared.
     """
     return (
         sum(_departure(c.frequency_hz, c.frequency_std) for c in curves),
@@ -123,10 +124,10 @@ def _departure(values: Array, std: Array) -> float:
 
 
 _WINDOW = (
-    0.4  # of a cycle: passes the third harmonic at half height and keeps the noise of two derivatives down
+    0.4  # share of a cycle: passes the third harmonic at half height and limits the noise of two derivatives
 )
-_BINS = 15  # along each axis of the map
-_LEAST = 8  # residuals in a bin, for it to be shown
+_BINS = 15  # number of bins along each axis of the map
+_LEAST = 8  # minimum number of residuals in a bin for it to be shown
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,12 +135,12 @@ class Apparent:
     """The missing moment along one run.
 
     Args:
-        angle: of the motion, shape (n,), rad.
-        rate: of the motion over its angular frequency, shape (n,), rad.
-        moment: smoothed, shape (n,), N m; rad/s² in normalised form.
-        start: index of the first residual these belong to.
+        angle: angle of the motion, shape (n,), rad.
+        rate: rate of the motion over its angular frequency, shape (n,), rad.
+        moment: smoothed moment, shape (n,), N m; rad/s² in normalised form.
+        start: index of the residual at which these begin.
         kernel: weights on residuals in rad that gave the moment, shape (m,).
-        noise_std: of one residual, rad.
+        noise_std: noise of one residual, rad.
     """
 
     angle: Array
@@ -164,8 +165,8 @@ def motion(fit: Fit, index: int) -> tuple[Array, Array]:
 def amplitude_about_rest(fit: Fit, index: int) -> Array:
     """Amplitude of the fitted motion of a run about its rest, rad, shape (n,).
 
-    A free decay ends at the zero of the fit. A driven body, or one that nothing holds, may rest anywhere, so the
-    middle of its run counts.
+    A free decay ends at the zero of the fit. A driven body, or one without a restoring moment, may rest
+    anywhere: the middle of its run counts.
     """
     angle, rate = motion(fit, index)
     data = fit.problem.data
@@ -207,15 +208,15 @@ class PhasePlane:
     """The mean missing moment by angle and rate.
 
     Args:
-        edges_rad: of the bins of both axes, shape (n + 1,), rad.
-        moment: mean by rate (rows) and angle (columns), shape (n, n); NaN where too few residuals fall.
-        std: of each mean under white noise, shape (n, n).
+        edges_rad: edges of the bins of both axes, shape (n + 1,), rad.
+        moment: mean by rate (rows) and angle (columns), shape (n, n); NaN in bins with too few residuals.
+        std: standard deviation of each mean under white noise, shape (n, n).
         by_angle: mean over all rates, shape (n,).
-        by_angle_std: of each, shape (n,).
+        by_angle_std: standard deviation of each, shape (n,).
         by_rate: mean over all angles, shape (n,).
-        by_rate_std: of each, shape (n,).
-        unit: of the moment: ``N m``, or ``rad/s2`` in normalised form.
-        runs: ids of the runs that it is the mean of.
+        by_rate_std: standard deviation of each, shape (n,).
+        unit: unit of the moment: ``N m``, or ``rad/s2`` in normalised form.
+        runs: ids of the averaged runs.
     """
 
     edges_rad: Row
@@ -230,7 +231,7 @@ class PhasePlane:
 
 
 def phase_plane(fit: Fit, run_ids: tuple[str, ...]) -> PhasePlane | None:
-    """The map of the missing moment in some runs, or in all where none is named; None without any."""
+    """The map of the missing moment in some runs, or in all if none is named; None without any."""
     data = fit.problem.data
     chosen = [i for i, run in enumerate(data.runs) if not run_ids or run.id in run_ids]
     found = [(data.runs[i].id, a) for i in chosen if (a := apparent_moment(fit, i)) is not None]

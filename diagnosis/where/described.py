@@ -15,9 +15,9 @@ from tunnel_sim.effects import Effect
 from tunnel_sim.effects.capabilities import AtRandom, SecondOscillation
 
 PLACE_OVERRULED: Final = 0.99
-"""Minimum share of the gap on held-out readings that causes explain for the place of the gap not to
-contradict them. Judgement. Causes that predict all but a hundredth of the gap act where it is. Residuals of a
-grossly wrong model may look like another place."""
+"""Minimum share of the gap on held-out readings that the causes must explain for the place of the gap not to
+contradict them. Judgement. Causes that predict all but a hundredth of the gap act at its place. Residuals of a
+grossly wrong model may point to another place."""
 
 INTERVAL_LOCATED: Final = 0.8
 """Maximum length of an interval, as a share of the range, for it to locate the gap. Judgement."""
@@ -56,16 +56,16 @@ class PlaceFound:
 
     Args:
         runs: number of the runs compared.
-        share: of the gap, in the runs that show it, a fraction.
-        false_alarm_rate: of a gap in any run, all runs together, a fraction.
+        share: share of the gap in the runs that show it, a fraction.
+        false_alarm_rate: false-alarm rate of a gap in any run, all runs together, a fraction.
         wind: excess by state of the wind, ``on`` and ``off``, a ratio; empty without runs of both.
         narrow: the intervals that locate the gap: ``time_s``, ``amplitude_rad``, ``frequency_hz``.
         bands: share of the gap by band beyond chance, fractions.
         channel: the reason for the channel.
         condition: the reason for the condition.
-        compared: all causes of the answer, whose channels are compared with the place.
-        agrees: whether any of them acts there, or its residual points there.
-        alike: whether the residual of one points there, though none acts there.
+        compared: all causes of the answer, to compare their channels with the place.
+        agrees: whether any of them acts at the place, or its residual points there.
+        alike: whether the residual of one points there, although none acts there.
         elsewhere: whether the place contradicts the causes: none of them acts there. Such an answer is not decided.
     """
 
@@ -89,7 +89,7 @@ class Nowhere:
 
     Args:
         runs: number of the runs compared.
-        p_value: of the run that differs most, corrected for their number, a probability.
+        p_value: p-value of the run that differs most, corrected for the number of runs.
         within_step: whether the residual is not white, but within the steps of the readings.
     """
 
@@ -120,9 +120,9 @@ def described(
     """The facts about a place.
 
     Args:
-        compared: causes that have to agree with it.
+        compared: causes that should agree with the place.
         scattering: whether the runs differ from each other by chance in the answer.
-        explained: share of the gap that they explain on held-out readings.
+        explained: share of the gap that the causes explain on held-out readings.
     """
     maps = place.survey.maps
     length, greatest = float(maps.time.edges_s[-1]), float(maps.amplitude.edges_rad[-1])
@@ -156,11 +156,11 @@ def described(
 
 @dataclass(frozen=True)
 class Judgement:
-    """The place against the causes: the verdict, the decision and the sentences on the place follow it.
+    """Comparison of the place with the causes; the verdict, the decision and the sentences on the place follow it.
 
     Args:
-        agrees: whether any cause acts there, or its residual points there.
-        alike: whether the residual of one points there, though none acts there.
+        agrees: whether any cause acts at the place, or its residual points there.
+        alike: whether the residual of one points there, although none acts there.
         elsewhere: whether the place contradicts the causes.
     """
 
@@ -179,9 +179,9 @@ def judged(
     decay of every run by chance.
 
     Args:
-        channel: on which the gap acts; None: not known.
-        reason: its kind.
-        compared: the causes; empty where none is named.
+        channel: the channel on which the gap acts; None: not known.
+        reason: kind of the reason for the channel.
+        compared: the causes; empty if none is named.
         scattering: whether the runs differ from each other by chance in the answer.
     """
     acting = {kind.channel for kind in compared}

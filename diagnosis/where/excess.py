@@ -46,11 +46,11 @@ class RunExcess:
     """One run's squared residual by frequency.
 
     Args:
-        frequency: of the coefficients, shape (n,), Hz.
+        frequency: frequencies of the coefficients, shape (n,), Hz.
         power: squared coefficients, shape (n,), in noise variances: one each under white noise.
         resonance: frequency of the run's free motion, Hz.
         relative: standard deviation of the noise variance, as a share of it.
-        absorbed: degrees of freedom the fit took from the run.
+        absorbed: degrees of freedom that the fit took from the run.
     """
 
     id: str
@@ -67,7 +67,7 @@ class RunExcess:
 
     @property
     def std(self) -> float:
-        """Standard deviation of the excess where there is no gap."""
+        """Standard deviation of the excess without a gap."""
         return float(np.hypot(np.sqrt(2.0 / self.power.size), self.relative))
 
     @property
@@ -80,7 +80,7 @@ class RunExcess:
         return np.isin(self.band, [index for index, (name, _) in enumerate(BANDS) if name in bands])
 
     def p_value(self) -> float:
-        """Probability of as much power without a gap: the least of the tests, times their number."""
+        """Probability of as much power without a gap: the smallest p-value of the tests, times their number."""
         tests = [chance(float(self.power.sum()), self.power.size - self.absorbed, self.relative)]
         for index, (name, _) in enumerate(BANDS):
             power = self.power[self.band == index]
@@ -95,7 +95,7 @@ def run_excesses(campaign: Campaign, fit: Fit) -> list[RunExcess]:
     data = fit.problem.data
     records = {run.id: run.record for run in campaign.runs}
     relative = [estimate_variance(records[run.id])[1] for run in data.runs]
-    # by sample, not by block: where all runs share one level it was pooled over them
+    # by sample, not by block: if all runs share one level, it was pooled over them
     levels = [run.noise.variance * run.block for run in data.runs]
     if np.allclose(levels, levels[0], rtol=1e-9):
         relative = [float(np.mean(relative)) / np.sqrt(len(relative))] * len(relative)
@@ -121,7 +121,7 @@ class BandExcess:
     Args:
         excess: sum of power beyond white noise, in units of the noise variance.
         mean: excess per coefficient, a ratio.
-        p_value: probability of as much without a gap.
+        p_value: probability of as much power without a gap.
     """
 
     band: str
@@ -146,7 +146,7 @@ def band_excesses(runs: list[RunExcess]) -> tuple[BandExcess, ...]:
 
 
 def bands_beyond_chance(bands: tuple[BandExcess, ...], chosen: WhereSettings) -> tuple[str, ...]:
-    """The bands whose power is beyond chance; all of them where none is."""
+    """The bands with power beyond chance; all bands if there are none."""
     level = chosen.band_rate / max(len(bands), 1)
     found = tuple(band.band for band in bands if band.p_value < level and band.excess > 0.0)
     return found or tuple(band.band for band in bands)
@@ -171,10 +171,10 @@ class Profile:
     """Excess squared residual over one quantity, all runs together.
 
     Args:
-        edges: of the bins, shape (n + 1,), in the quantity's unit.
+        edges: edges of the bins, shape (n + 1,), in the quantity's unit.
         energy: sum over a bin of power beyond white noise, shape (n,), in noise variances.
         mean: excess per residual, shape (n,); NaN where a bin is empty.
-        std: of the mean where there is no gap, shape (n,).
+        std: standard deviation of the mean without a gap, shape (n,).
     """
 
     edges: Array
@@ -183,7 +183,7 @@ class Profile:
     std: Array
 
     def interval(self, share: float) -> tuple[float, float] | None:
-        """The shortest interval with a share of the excess, a fraction; None where there is no excess."""
+        """The shortest interval that contains a share (a fraction) of the excess; None without an excess."""
         return shortest_interval(self.edges, self.energy, share)
 
 
@@ -193,11 +193,11 @@ def profile(
     """Gather squared residuals into bins.
 
     Args:
-        edges: of the bins, ascending, shape (n + 1,).
-        place: value of the quantity at every residual, by run, arrays of one shape with ``power``.
+        edges: edges of the bins, ascending, shape (n + 1,).
+        place: value of the quantity at every residual, by run, arrays of the shape of ``power``.
         power: squared residuals in noise variances, by run, arrays of shape (m,).
-        expected: mean of these under white noise, by run.
-        variance: contribution of each to the variance of a sum of them under white noise, by run.
+        expected: mean of the squared residuals under white noise, by run.
+        variance: contribution of each squared residual to the variance of a sum under white noise, by run.
     """
     where = np.concatenate(place)
     excess = np.concatenate([p - e for p, e in zip(power, expected, strict=True)])
@@ -214,12 +214,12 @@ def shortest_interval(edges: Array, energy: Array, share: float) -> tuple[float,
     """The shortest sequence of bins with a share of the whole.
 
     Args:
-        edges: of the bins, shape (n + 1,).
-        energy: by bin, shape (n,); single bins may be negative.
-        share: of the sum, a fraction.
+        edges: edges of the bins, shape (n + 1,).
+        energy: energy by bin, shape (n,); single bins may be negative.
+        share: share of the sum, a fraction.
 
     Returns:
-        Its ends; None where the sum is not positive.
+        The ends of the sequence; None where the sum is not positive.
     """
     total = float(energy.sum())
     if total <= 0.0:
@@ -235,14 +235,14 @@ def shortest_interval(edges: Array, energy: Array, share: float) -> tuple[float,
 
 
 _WIDTH = 5  # coefficients a line spreads over
-_AROUND = 60  # coefficients on either side, whose median a line must exceed
-_HARMONIC = 0.2  # of the run's frequency: a line nearer to a harmonic belongs to the motion
-_MOTION = 0.4  # of the run's frequency: the same for the motion itself, whose frequency may drift
-_LOWEST = 0.5  # of the run's frequency: below, drifts look like lines
-_APART = 0.5  # of the run's frequency, between two lines: a nearer one is the skirt of the first
+_AROUND = 60  # coefficients on either side for the median that a line must exceed
+_HARMONIC = 0.2  # share of the run's frequency: a line this close to a harmonic belongs to the motion
+_MOTION = 0.4  # share of the run's frequency: the same for the motion itself, because its frequency may drift
+_LOWEST = 0.5  # share of the run's frequency below which drifts look like lines
+_APART = 0.5  # share of the run's frequency between two lines: a closer line is the skirt of the first
 _PER_RUN = 2
-_OF_INPUT = 1e-3  # of the power of a run's input: less may be interference in its wires
-_MULTIPLES = 3  # of the frequency of an input: responses at higher ones are never most of a gap
+_OF_INPUT = 1e-3  # share of the power of a run's input: less may be interference in its wires
+_MULTIPLES = 3  # multiple of an input's frequency: responses at higher frequencies are never most of a gap
 
 
 @dataclass(frozen=True)
@@ -250,10 +250,10 @@ class ResidualLine:
     """A line in one run.
 
     Args:
-        run: its id.
+        run: id of the run.
         frequency_hz: Hz.
         share: of the run's excess squared residual, a fraction.
-        amplitude_rad: of the reading, in its unit.
+        amplitude_rad: amplitude of the reading, in its unit.
     """
 
     run: str
@@ -298,7 +298,7 @@ def residual_lines(
 
 
 def of_drive(size: int, own: RunData) -> NDArray[np.bool_]:
-    """Frequencies at which a line may be the response to a run's input: where that has power, and its multiples.
+    """Frequencies at which a line may be the response to a run's input: bands of its power, and their multiples.
 
     Args:
         size: number of coefficients, n; the result has the shape (n,).
@@ -308,19 +308,19 @@ def of_drive(size: int, own: RunData) -> NDArray[np.bool_]:
         return mask
     time = own.start + (np.arange(size) + 0.5) * own.interval
     values = np.interp(time, own.drive.time_s + own.drive.delay, own.drive.values)
-    # Tapered, because a sinusoid that does not fit into the record leaks into all frequencies.
+    # tapered, because a sinusoid that does not fit into the record leaks into all frequencies
     power = dct((values - values.mean()) * np.hanning(values.size), norm="ortho") ** 2
     local = np.convolve(power, np.ones(_WIDTH), mode="same")
     for index in np.flatnonzero(local >= _OF_INPUT * float(power.sum())).tolist():
         for multiple in range(1, _MULTIPLES + 1):
-            # A multiple is as many times as wide.
+            # a multiple is proportionally wider
             reach = _WIDTH + multiple // 2
             mask[max(multiple * index - reach, 0) : multiple * index + reach + 1] = True
     return mask
 
 
 def away_from_motion(order: Array) -> NDArray[np.bool_]:
-    """Where a line does not belong to the motion, its drift or its harmonics.
+    """Whether a line does not belong to the motion, its drift or its harmonics.
 
     Args:
         order: frequency over the frequency of the run's motion, any shape.

@@ -1,10 +1,10 @@
 """Jumps of a run's oscillation at an instant, and starts that are not free, from its reading alone.
 
-A blow changes angle and rate of a free decay at once. Causes change its amplitude, frequency and harmonics along
-the decay, but smoothly. Around every instant, the reading over a few cycles is therefore fitted by smooth
-harmonics of the run's own oscillation, whose slope may change there, and then with a jump of the oscillation as
-well. No model of the rig is needed, so a large gap from any cause does not hide a blow. A body that is held when
-the record starts departs from the same harmonics, continued to the start.
+A blow changes angle and rate of a free decay at once. Causes change the amplitude, frequency and harmonics
+along the decay, but smoothly. Around every instant, the reading over a few cycles is therefore fitted twice: by
+smooth harmonics of the run's own oscillation, with a kink allowed at the instant, and then with a jump of the
+oscillation as well. No model of the rig is needed, so a large gap from any cause does not hide a blow. A body
+that is held when the record starts departs from the same harmonics, continued to the start.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from diagnosis.likelihood.residuals import linear_coefficients, resonance
 from tunnel_sim.vocabulary.quantities import Angles, Vector
 from tunnel_sim.vocabulary.record import Array
 
-_ROWS = 24  # per cycle, to which readings are averaged: nothing above the third harmonic is fitted
-_HALF = 2.0  # cycles on either side of an instant that are fitted; nearer to an end no jump is sought
+_ROWS = 24  # rows per cycle to which readings are averaged: nothing above the third harmonic is fitted
+_HALF = 2.0  # fitted cycles on either side of an instant; closer to an end no jump is sought
 _APART = 0.25  # cycles between the instants
 _FEWEST = 6.0  # cycles of a run in which jumps are sought
-_SMOOTH, _SLOW = 4, 2  # orders of the slow change of amplitude and phase, the first time and then
-_ROUNDS = 3  # of finding that change, each from the previous one
-_COLUMNS = 23  # of `_Oscillation.around`
+_SMOOTH, _SLOW = 4, 2  # orders of the slow change of amplitude and phase, first and later
+_ROUNDS = 3  # rounds of finding that change, each from the previous one
+_COLUMNS = 23  # number of columns of `_Oscillation.around`
 #: Indices of the columns that are not continued to a start: fast changes and kinks of both waves, and the jump.
 _OF_JUMPS = (5, 6, 10, 11, 20, 21)
-_AT_ONCE = 200  # instants, which bounds the memory
-_FREE = 0.015  # departure of the start over the swing, root mean square, that every run may have
+_AT_ONCE = 200  # maximum number of instants, which bounds the memory
+_FREE = 0.015  # root mean square departure of the start over the swing that every run may have
 _HELD = 3  # cycles in which a start that is not free is sought
-_CLEAR = 4.0  # noise standard deviations of an amplitude that shows it
+_CLEAR = 4.0  # minimum amplitude of such a start, in noise standard deviations
 _QUARTILE = 0.575  # the lower quartile of χ² with two degrees of freedom
 
 
@@ -44,8 +44,9 @@ class Jumps:
     Args:
         id: of the run.
         time: the instants since the start of the fitted part, shape (n,), s.
-        drop: of χ² by a jump of amplitude and phase, shape (n,), in the variance of the noise, of the departure
-            from smooth harmonics around the instant, or of the run's other jumps, whichever is largest.
+        drop: drop of χ² by a jump of amplitude and phase, shape (n,), in the variance of the noise, of the
+            departure from smooth harmonics around the instant, or of the run's other jumps, whichever is
+            largest.
         chance: probability of as large a drop at that instant by chance, shape (n,).
     """
 
@@ -60,7 +61,7 @@ class _Oscillation:
     """A run's reading in rows, in noise standard deviations, and the slow change of its oscillation.
 
     Args:
-        time: of every row, shape (n,), s.
+        time: time of every row, shape (n,), s.
         size: logarithm of the amplitude, shape (n,).
     """
 
@@ -71,7 +72,7 @@ class _Oscillation:
 
     @property
     def cycles(self) -> Array:
-        """Since the first row, shape (n,)."""
+        """Cycles since the first row, shape (n,)."""
         return np.asarray((self.phase - self.phase[0]) / (2.0 * np.pi))
 
     @classmethod
@@ -90,7 +91,7 @@ class _Oscillation:
         return found
 
     def _followed(self, order: int) -> _Oscillation:
-        """With phase and amplitude that follow the reading, as polynomials of time."""
+        """The oscillation with phase and amplitude that follow the reading, as polynomials of time."""
         cycles = self.cycles
         places = np.arange(0.5, cycles[-1] - 0.4, 0.5)
         if places.size == 0:
@@ -119,7 +120,7 @@ class _Oscillation:
         return _Oscillation(self.time, self.reading, self.phase + change[0], self.size + change[1])
 
     def around(self, instants: Array) -> tuple[Array, Array]:
-        """Around instants (cycles) the smooth harmonics, the jump and the reading, in columns.
+        """Around instants (cycles): the smooth harmonics, the jump and the reading, in columns.
 
         Returns:
             The columns, shape (m, rows, n), with rows of zeros after the last one of an instant, and the number of
@@ -144,10 +145,10 @@ class _Oscillation:
 def _windows(
     cycles: Array, centres: Array, half: float, fewest: int
 ) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """The rows within half a width of centres, and which of them are: the others fill up to the longest window.
+    """The rows within half a width of centres, padded to the longest window, and a mask of the true rows.
 
     Args:
-        fewest: rows of a window.
+        fewest: minimum number of rows of a window.
     """
     order = np.argsort(cycles, kind="stable")
     first = np.searchsorted(cycles, centres - half, sorter=order)
@@ -160,20 +161,20 @@ def jumps(fit: Fit) -> list[Jumps]:
     """The jumps of every free decay that is long enough.
 
     Args:
-        fit: of the nominal model; its frequencies are close to the runs'.
+        fit: fit of the nominal model; its frequencies are close to the runs'.
     """
     return [found for index in range(len(fit.problem.data.runs)) if (found := _of_run(fit, index))]
 
 
 def starts(fit: Fit) -> list[Jumps]:
-    """The departure of the first cycles of every free decay from the harmonics of the three that follow each.
+    """The departure of the first cycles of every free decay from the harmonics of the next three cycles.
 
     Args:
         fit: as in `jumps`.
 
     Returns:
-        As jumps at the start of these cycles. Causes that act at large amplitudes make all runs depart by a similar
-        share of the swing, so the drop is the power of the departure in units of `_FREE` of the swing.
+        As jumps at the start of these cycles. Causes that act at large amplitudes make all runs depart by a
+        similar share of the swing, so the drop is the power of the departure in units of `_FREE` of the swing.
     """
     found = []
     for index, run in enumerate(fit.problem.data.runs):
@@ -216,7 +217,7 @@ def _of_run(fit: Fit, index: int) -> Jumps | None:
 
 
 def _motion(fit: Fit, index: int) -> _Oscillation | None:
-    """The oscillation of a run; None where it is driven, too short, or read too rarely for its harmonics."""
+    """The oscillation of a run; None if it is driven, too short, or sampled too rarely for its harmonics."""
     run, frequency = fit.problem.data.runs[index], resonance(fit, index)
     if run.drive is not None or run.reading.size * run.interval * frequency < _FEWEST:
         return None
@@ -233,7 +234,7 @@ def _triangle(columns: Array) -> Array:
 
 
 def _compared(motion: _Oscillation, instants: Array) -> Array:
-    """By instant, the drop of χ², the residual χ² per degree of freedom, and these degrees, shape (3, m)."""
+    """By instant, the drop of χ², the residual χ² per degree of freedom, and their number, shape (3, m)."""
     columns, count = motion.around(instants)
     # the last column in the orthonormal basis of the columns before it
     reading = _triangle(columns)[..., -1] ** 2

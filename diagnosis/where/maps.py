@@ -1,4 +1,4 @@
-"""Data of a diagnosis' figures, small enough to be part of its JSON, in the measured rig's units.
+"""Data of the figures of a diagnosis, small enough to be part of its JSON, in the measured rig's units.
 
 An excess is the mean squared residual over the noise variance, minus one, a ratio.
 """
@@ -15,8 +15,9 @@ from diagnosis.where.along_motion import Backbone, PhasePlane
 from diagnosis.where.excess import BandExcess, ResidualLine
 from tunnel_sim.files.from_json import Row, Rows
 
-_DIGITS = 5  # significant: more than any figure shows
-_DIGITS_OF_BACKBONE = {"frequency_hz": 8, "zeta": 8}  # shown as differences from the nominal model
+_DIGITS = 5  # significant digits: more than any figure shows
+# the same for values shown as differences from the nominal model
+_DIGITS_OF_BACKBONE = {"frequency_hz": 8, "zeta": 8}
 
 
 @dataclass(frozen=True)
@@ -24,13 +25,13 @@ class RunMap:
     """One run in the map of runs.
 
     Args:
-        spring_stiffness: stated, N m/rad; None in normalised form.
-        wind_speed: stated, m/s.
-        id: of the run.
-        amplitude_rad: at the start of the record, rad.
-        frequency_hz: of the free motion in the nominal model, Hz.
-        excess: of the nominal model.
-        std: its standard deviation where there is no gap, a ratio.
+        spring_stiffness: stated stiffness, N m/rad; None in normalised form.
+        wind_speed: stated wind speed, m/s.
+        id: id of the run.
+        amplitude_rad: amplitude at the start of the record, rad.
+        frequency_hz: frequency of the free motion in the nominal model, Hz.
+        excess: excess of the nominal model.
+        std: standard deviation of the excess without a gap, a ratio.
         p_value: probability of as large an excess without a gap.
         share: of the campaign's excess, a fraction.
     """
@@ -52,10 +53,10 @@ class GroupExcess:
 
     Args:
         by: ``wind``, ``spring``, ``speed`` or ``amplitude``.
-        label: in words, with unit.
-        runs: their number.
-        excess: mean over the runs.
-        std: its standard deviation where there is no gap, a ratio.
+        label: the condition in words, with unit.
+        runs: number of runs.
+        excess: mean excess over the runs.
+        std: standard deviation of the mean without a gap, a ratio.
     """
 
     by: str
@@ -70,10 +71,10 @@ class TimeExcess:
     """Excess over time, all runs together.
 
     Args:
-        edges_s: of the bins, since the start of the record, shape (n + 1,), s.
-        excess: mean by bin, shape (n,); NaN where a bin is empty.
-        std: of it where there is no gap, shape (n,).
-        by_run: mean by run (rows) and bin (columns), shape (runs, n); NaN after a run's end.
+        edges_s: edges of the bins, since the start of the record, shape (n + 1,), s.
+        excess: mean excess by bin, shape (n,); NaN where a bin is empty.
+        std: standard deviation of the mean without a gap, shape (n,).
+        by_run: mean excess by run (rows) and bin (columns), shape (runs, n); NaN after a run's end.
         moment_share: energy of the apparent moment by bin, shape (n,), as shares of the whole.
     """
 
@@ -89,9 +90,9 @@ class AmplitudeExcess:
     """Excess over the amplitude of the motion, all runs together.
 
     Args:
-        edges_rad: of the bins, shape (n + 1,), rad.
-        excess: mean by bin, shape (n,); NaN where a bin is empty.
-        std: of it where there is no gap, shape (n,).
+        edges_rad: edges of the bins, shape (n + 1,), rad.
+        excess: mean excess by bin, shape (n,); NaN where a bin is empty.
+        std: standard deviation of the mean without a gap, shape (n,).
     """
 
     edges_rad: Row
@@ -104,11 +105,11 @@ class ExcessSpectrum:
     """Excess over frequency, all runs together.
 
     Args:
-        edges_hz: of the bins, shape (n + 1,), Hz.
-        excess: mean by bin, shape (n,); NaN where a bin is empty.
-        std: of it where there is no gap, shape (n,).
-        after: mean by bin with the causes added, shape (n,); None where nothing was added.
-        by_run: mean by run (rows) and bin (columns), shape (runs, n); NaN where a bin is empty.
+        edges_hz: edges of the bins, shape (n + 1,), Hz.
+        excess: mean excess by bin, shape (n,); NaN where a bin is empty.
+        std: standard deviation of the mean without a gap, shape (n,).
+        after: mean excess by bin with the causes added, shape (n,); None where no cause was added.
+        by_run: mean excess by run (rows) and bin (columns), shape (runs, n); NaN where a bin is empty.
         resonance_hz: least and greatest frequency of the runs' free motion, Hz.
     """
 
@@ -122,14 +123,15 @@ class ExcessSpectrum:
 
 @dataclass(frozen=True, eq=False)
 class ExcessMap:
-    """Excess by amplitude and by wind speed, or by time where the runs have one speed.
+    """Excess by amplitude and by wind speed; by amplitude and time if the runs have one speed.
 
     Args:
-        amplitude_edges_rad: of the rows, rad, shape (m + 1,).
-        wind_speeds: of the columns, m/s, shape (n,); None where the columns are times.
-        time_edges_s: of the columns, since the start of the record, s, shape (n + 1,); None where they are speeds.
-        excess: mean by cell, shape (m, n), in noise variances of a sample; NaN where a cell is empty.
-        std: of it where there is no gap, shape (m, n).
+        amplitude_edges_rad: edges of the rows, rad, shape (m + 1,).
+        wind_speeds: wind speeds of the columns, m/s, shape (n,); None where the columns are times.
+        time_edges_s: edges of the columns, since the start of the record, s, shape (n + 1,); None where they
+            are speeds.
+        excess: mean excess by cell, shape (m, n), in noise variances of a sample; NaN where a cell is empty.
+        std: standard deviation of the mean without a gap, shape (m, n).
     """
 
     amplitude_edges_rad: Row
@@ -146,14 +148,14 @@ class RunTrace:
     A model's prediction is the reading minus its residual.
 
     Args:
-        id: of the run.
-        time_s: s, shape (n,); without the times at which the record has no sample.
+        id: id of the run.
+        time_s: times, s, shape (n,); without the times at which the record has no sample.
         reading_rad: means of the fitted reading, shape (n,).
         before_rad: residuals of the nominal model, shape (n,).
-        after_rad: residuals with the causes added, shape (n,); None where nothing was added.
-        noise_std_rad: of one value.
-        differ_s: the few cycles in which the models differ most, s; where nothing was added, in which the nominal
-            model has its largest misfit.
+        after_rad: residuals with the causes added, shape (n,); None where no cause was added.
+        noise_std_rad: noise of one value.
+        differ_s: the few cycles in which the models differ most, s; without causes, the cycles in which the
+            nominal model has its largest misfit.
     """
 
     id: str
@@ -178,9 +180,9 @@ class Maps:
         bands: the residual by multiples of the runs' own frequency.
         lines: narrow lines in the residuals of single runs.
         backbones: frequency and damping of every run by amplitude.
-        phase_plane: missing moment by angle and rate; None where there is none.
+        phase_plane: missing moment by angle and rate; None if there is none.
         grid: excess by amplitude and speed, or amplitude and time.
-        unit: of the readings and residuals.
+        unit: unit of the readings and residuals.
         traces: every run against time, the largest excess first.
     """
 
@@ -208,7 +210,7 @@ class Maps:
         return math.sqrt(sum(run.std**2 for run in self.runs)) / len(self.runs)
 
     def rounded(self) -> Maps:
-        """These maps with the digits of a document in their arrays."""
+        """The maps with the number of digits that a document has in its arrays."""
         return replace(self, **{name: _rounded(value) for name, value in vars(self).items()})
 
     def to_json_dict(self) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from tunnel_sim.vocabulary.campaign import Campaign
 NAMED_RUN: Final = 0.1
 """Minimum excess of a further run to be named, as a share of the largest excess. Judgement."""
 ONE_RUN: Final = 0.8
-"""Share of the excess in one run above which the runs do not show whether the gap needs wind. Judgement."""
+"""Share of the excess in one run above which the runs cannot show whether the gap needs wind. Judgement."""
 ONE_RUN_OF: Final = 3
 """Minimum number of runs for this test. Judgement."""
 BLOW_SHARE: Final = 0.5
@@ -51,7 +51,7 @@ SHIFTED_CENTRE: Final = 0.05
 HARMONIC_SHARE: Final = 0.5
 """Minimum share of the excess in harmonics for them to locate the gap. Convention. Most of it."""
 ALONE_LEAVES: Final = 0.2
-"""Maximum share of the excess that remains in fits to single runs, if every run is linear. Judgement."""
+"""Maximum share of the excess that remains in fits to single runs for every run to count as linear. Judgement."""
 DRIFT_RATIO: Final = 1.5
 """Minimum ratio of the drifts of frequency and damping for the larger one to locate the gap. Judgement."""
 
@@ -86,19 +86,19 @@ def locate(campaign: Campaign, nominal: Fit, *, hum_removed: bool = False, noise
     """Find where the nominal model departs from the runs.
 
     Args:
-        campaign: as measured, of the units of the fit.
+        campaign: the measured campaign, in the units of the fit.
         nominal: fit of the nominal model.
-        hum_removed: whether a hum was removed before the fit. It is part of the gap, so it is restored to the
+        hum_removed: whether a hum was removed before the fit. It is part of the gap, so it is added back to the
             residuals.
-        noise_ratio: noise variance of the fit over the reference one: a step of the readings that is coarser than
-            stated raises the noise found in the records, and the stated noise is the reference.
+        noise_ratio: noise variance of the fit over the reference. A step of the readings that is coarser than
+            stated raises the noise found in the records, and the stated noise is then the reference.
     """
     data, residuals = nominal.problem.data, nominal.residuals
     if hum_removed:
         variance = {run.id: run.noise.variance for run in data.runs}
         given = prepare(campaign, variance, data.similarity, model=data.model, settings=data.settings)
         readings = {run.id: run.reading for run in given.runs}
-        # the fit may leave a record's start out; both end together
+        # the fit may leave out the start of a record; both end together
         residuals = [
             r + run.scaled(readings[run.id][-run.reading.size :] - run.reading)
             for r, run in zip(residuals, data.runs, strict=True)
@@ -112,14 +112,14 @@ def locate(campaign: Campaign, nominal: Fit, *, hum_removed: bool = False, noise
 
 
 def runs_beyond_chance(excesses: Sequence[RunExcess], chosen: WhereSettings) -> tuple[str, ...]:
-    """The runs beyond chance with a good part of the largest excess among them."""
+    """The runs beyond chance, from the largest excess down to a good part of it."""
     clear = {run.id: run.excess for run in excesses if run.p_value() * len(excesses) < chosen.run_rate}
     least = NAMED_RUN * max(clear.values(), default=0.0)
     return tuple(name for name, excess in clear.items() if excess > least)
 
 
 def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Conclusion:
-    """Whether the gap needs wind: ``wind_on`` where the wind-off runs, fitted alone, show no gap."""
+    """Whether the gap needs wind: ``wind_on`` if the wind-off runs, fitted alone, show no gap."""
     runs, shown, chosen = nominal.problem.data.runs, found.maps.runs, nominal.settings.where
     off = tuple(run.id for run in nominal.problem.data.in_still_air)
     if len(off) == len(runs):
@@ -131,7 +131,7 @@ def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Conclusi
     most = max(shown, key=lambda run: run.share)
     if len(shown) >= ONE_RUN_OF and most.share > ONE_RUN and most.id not in off:
         return Conclusion(None, Fact("one run", {"run": most.id}))
-    # without coefficients and a gain that these runs lack
+    # without the coefficients and gain that these runs do not show
     data = nominal.problem.data.alone(off)
     try:
         alone = fit(Problem(data), nominal_start(data))
@@ -146,14 +146,14 @@ def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Conclusi
 
 
 def blow_interval(found: Survey, share: float) -> tuple[float, float] | None:
-    """The time in which most of the missing moment acts, where that is a small part of the record.
+    """The time in which most of the missing moment acts, if it is a small part of the record.
 
     Args:
-        share: of the moment's energy, a fraction.
+        share: share of the moment's energy, a fraction.
 
     Returns:
-        Start and end since the start of the record, s; None where the moment is spread out, acts at the release,
-        or is not clear of the noise.
+        Start and end since the start of the record, s; None if the moment is spread out, acts at the release,
+        or is not significant.
     """
     edges = found.maps.time.edges_s
     interval = shortest_interval(edges, found.moment_energy, share)
@@ -204,7 +204,7 @@ def infer_channel(nominal: Fit, survey: Survey, condition: str | None) -> Conclu
 
 
 def _between_runs(nominal: Fit, found: Survey) -> Conclusion | None:
-    """The channel where every run alone is linear, but the runs do not agree on the coefficients."""
+    """The channel if every run alone is linear, but the runs do not agree on the coefficients."""
     sizes = [run.reading.size for run in nominal.problem.data.runs]
     left, shifts = 0.0, []
     for curve, size in zip(found.maps.backbones, sizes, strict=True):
@@ -217,6 +217,7 @@ def _between_runs(nominal: Fit, found: Survey) -> Conclusion | None:
     if len(sizes) < 2 or left > ALONE_LEAVES * whole:
         return None
     frequency, damping = np.sum(np.array(shifts) ** 2, axis=0)
-    if frequency >= damping:  # as with a wrong spring, but also with gravity or a flexible rod beside several
+    # as with a wrong spring, but also with gravity or a flexible rod on several springs
+    if frequency >= damping:
         return Conclusion(None, Fact("frequency between runs"))
     return Conclusion("damping", Fact("damping between runs"))

@@ -37,25 +37,25 @@ from tunnel_sim.vocabulary.record import Array
 
 _TIME_BINS = 60
 _AMPLITUDE_BINS = 40
-_FREQUENCY_BINS = 110  # of equal ratio, for the picture
-_FINE_BINS = 1500  # of equal width, for the interval
+_FREQUENCY_BINS = 110  # number of bins of equal ratio, for the picture
+_FINE_BINS = 1500  # number of bins of equal width, for the interval
 _GRID_ROWS, _GRID_COLUMNS = 6, 8
-_TRACE_POINTS = 20_000  # of all runs together
-_LEAST_POINTS = 200  # of a run
-_CYCLE_POINTS = 24  # of a cycle
-_SHOWN_CYCLES = 6  # in which the models differ most
+_TRACE_POINTS = 20_000  # number of points of all runs together
+_LEAST_POINTS = 200  # minimum number of points of a run
+_CYCLE_POINTS = 24  # number of points in a cycle
+_SHOWN_CYCLES = 6  # number of cycles in which the models differ most
 
 
 @dataclass(frozen=True, eq=False)
 class Survey:
-    """Maps, and further figures for the text about them.
+    """Maps, and further figures for their text.
 
     Args:
         time_interval: shortest interval of time with most of the excess, s; None where there is no excess.
-        amplitude_interval: shortest interval of amplitude with most of it, rad.
-        frequency_interval: shortest interval of frequency with most of it, Hz.
+        amplitude_interval: shortest interval of amplitude with most of the excess, rad.
+        frequency_interval: shortest interval of frequency with most of the excess, Hz.
         moment_energy: energy of the apparent moment beyond noise, by bin of time, shape (n,), in variances.
-        moment_z: the sum of that over its standard deviation under white noise, a ratio.
+        moment_z: the sum of this energy over its standard deviation under white noise, a ratio.
     """
 
     maps: Maps
@@ -71,15 +71,15 @@ class Survey:
 class _Samples:
     """Squared residuals by run, and their places.
 
-    The misfit of a model is the same in a block mean as in its samples; the noise variance is less by the block's
-    size. Powers are therefore shares of the variance of one sample.
+    The misfit of a model is the same in a block mean as in its samples; the noise variance of the mean is
+    smaller by the block's size. Powers are therefore shares of the variance of one sample.
     """
 
-    time: list[Array]  # since the start of the record, s
-    amplitude: list[Array]  # rad
+    time: list[Array]  # time since the start of the record, s
+    amplitude: list[Array]  # amplitude, rad
     power: list[Array]
-    expected: list[float]  # of the power under noise
-    variance: list[float]  # of the power under noise
+    expected: list[float]  # mean of the power under noise
+    variance: list[float]  # variance of the power under noise
 
     @classmethod
     def of(cls, nominal: Fit, scaled: Fit, excesses: list[RunExcess], beyond: tuple[str, ...]) -> _Samples:
@@ -91,7 +91,8 @@ class _Samples:
             [amplitude_about_rest(scaled, i) for i in range(len(runs))],
             [r**2 / run.block for (r, _), run in zip(inside, runs, strict=True)],
             [share / run.block for (_, share), run in zip(inside, runs, strict=True)],
-            # squares of filtered noise are correlated: as many are independent as coefficients pass
+            # squares of filtered noise are correlated: the number of independent ones is the number of passed
+            # coefficients
             [2.0 * share / run.block**2 for (_, share), run in zip(inside, runs, strict=True)],
         )
 
@@ -104,8 +105,8 @@ def survey(nominal: Fit, scaled: Fit, excesses: list[RunExcess], chosen: tuple[s
 
     Args:
         scaled: the nominal fit with residuals in units of the reference noise.
-        excesses: its squared residuals, by run.
-        chosen: ids of the runs for the phase plane; all where empty.
+        excesses: squared residuals of the fit, by run.
+        chosen: ids of the runs for the phase plane; all if empty.
 
     Returns:
         Maps and interval in the measured rig's units.
@@ -181,7 +182,7 @@ def _moment_energy(nominal: Fit, times: Sequence[Array], instants: Array) -> tup
     """Energy of the apparent moment by time, in variances of its noise, and its sum over the scatter by chance.
 
     Args:
-        times: of the residuals, by run, shape (n,), s.
+        times: times of the residuals, by run, shape (n,), s.
         instants: edges of the bins, shape (m + 1,), s.
     """
     energy, variance = np.zeros(instants.size - 1), 0.0
@@ -203,7 +204,7 @@ def _frequency_interval(
     """The shortest interval of frequency with most of the excess of the bands that show the gap, Hz."""
     kept = [replace(run, power=np.where(run.inside(beyond), run.power, 1.0)) for run in excesses]
     high = max(float(run.frequency[-1]) for run in excesses)
-    # no bin is narrower than the shortest record resolves
+    # no bin is narrower than the resolution of the shortest record
     resolved = max(float(run.frequency[1]) for run in excesses)
     fine = np.linspace(0.0, high * 1.0001, max(2, min(_FINE_BINS, int(high / resolved))) + 1)
     interval = _spectrum(kept, fine).interval(nominal.settings.where.interval_share)
@@ -212,7 +213,7 @@ def _frequency_interval(
 
 
 def with_answer(found: Survey, campaign: Campaign, nominal: Fit, answer: Fit) -> Maps:
-    """The maps with the residuals of a fit with the causes beside the nominal model's."""
+    """The maps with the residuals of a fit with the causes added to the nominal model's."""
     after = _spectrum(run_excesses(campaign, answer), _log_edges(found.excesses)).mean
     return replace(
         found.maps,
@@ -288,7 +289,7 @@ def _grid(samples: _Samples, runs: Sequence[RunData], rows: Array, units: tuple[
     """Excess by amplitude and wind speed; by amplitude and time where the runs have one speed.
 
     Args:
-        units: radian and second of the similar rig in the measured one's.
+        units: radian and second of the similar rig in the measured rig's.
     """
     setting = speed_groups(run.wind_speed for run in runs)
     speeds = sorted(set(setting.values()))
@@ -345,7 +346,7 @@ def _traces(nominal: Fit, best: Fit | None, excesses: list[RunExcess]) -> tuple[
             seen.append(run.unscaled(best.residuals[index]))
         filled = _means(run.counts.astype(np.float64), group) > 0.0
         time, reading, before, *after = (_means(values, group)[filled] for values in seen)
-        # the few cycles with most of the difference's energy; the whole record where it is shorter
+        # the few cycles with most of the difference's energy; the whole record if it is shorter
         first, last, length = float(time[0]), float(time[-1]), _SHOWN_CYCLES / frequency
         if last - first > length:
             difference = before - after[0] if after else before

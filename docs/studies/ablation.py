@@ -1,4 +1,4 @@
-"""The loss without each setting of the diagnosis, on campaigns of known truth.
+"""The effect of each setting of the diagnosis when it is changed, on campaigns of known truth.
 
 Every deciding number is doubled, halved or switched off, and the campaigns are answered again:
 
@@ -12,8 +12,8 @@ truth, and of ``unknown`` where a true effect is withheld. For every wrong answe
 alone to show whether the search missed it or the answer has more weight.
 
 SET is made by ``tunnel blind make``; its key is opened, so it is no longer a blind test. The table gives the
-numbers of exact answers and of false causes, the mean logarithm of the probability of the truth, and the frequency
-of wrong sets where one true effect is withheld by deleting the sets that contain it.
+numbers of exact answers and of false causes, the mean logarithm of the probability of the truth, and the
+frequency of wrong sets when one true effect is withheld by deleting the sets that contain it.
 """
 
 from __future__ import annotations
@@ -58,10 +58,10 @@ WEIGHING = (
 )
 """Settings that only weigh fits."""
 FACTORS = (0.0, 0.5, 2.0)
-"""By which each is multiplied; 0 switches it off."""
+"""Factors that multiply each setting; 0 switches it off."""
 
 ODDS = ("weighing.unknown_at", "weighing.unknown_gap", "weighing.unknown_left")
-_LEAST = 0.02  # least probability: a single certain and wrong answer must not decide
+_LEAST = 0.02  # least probability, because a single certain and wrong answer must not decide
 
 Names = tuple[str, ...]
 
@@ -74,9 +74,9 @@ class Case:
         truth: names of the true effects, sorted; ``("unknown",)`` outside the vocabulary.
         small: names of the true effects that need not be found.
         read_off: causes detected in the records.
-        sets: fitted sets; empty where nothing was weighed.
-        nominal: misfit of the nominal model; None where nothing was weighed.
-        causes: the answer where nothing was weighed.
+        sets: fitted sets; empty if none were weighed.
+        nominal: misfit of the nominal model; None if no sets were weighed.
+        causes: the answer if no sets were weighed.
     """
 
     truth: Names
@@ -96,7 +96,7 @@ class Case:
         """The answers with their probabilities, the answer first.
 
         Args:
-            withheld: an effect whose sets are deleted.
+            withheld: an effect; the sets with it are deleted.
             chosen: settings of the weighing.
         """
         if self.nominal is None:
@@ -113,8 +113,8 @@ class Tally:
     """Counts of the answers.
 
     Args:
-        exact: campaigns whose causes are exactly right.
-        cases: campaigns.
+        exact: campaigns with exactly right causes.
+        cases: number of campaigns.
         false: number of named causes that do not act.
         named: number of named causes.
         log_score: mean logarithm of the probability of the truth, at least ln 0.001.
@@ -164,8 +164,8 @@ def moved(name: str, factor: float) -> Settings:
     """The settings with one of them multiplied.
 
     Args:
-        name: of the setting, with its stage.
-        factor: dimensionless.
+        name: name of the setting, with its stage.
+        factor: factor, dimensionless.
     """
     value = Settings().values()[name]
     return Settings().changed({name: type(value)(value * factor)})
@@ -237,15 +237,15 @@ def _truths(folder: Path, count: int) -> list[tuple[str, list[str], list[str]]]:
 
 
 def fitted_odds(cases: Sequence[Case]) -> dict[str, float]:
-    """The settings of the odds against ``unknown`` under which the truth is most probable.
+    """The settings of the odds against ``unknown`` with the greatest probability of the truth.
 
     Args:
-        cases: their sets are reweighed, with all effects and without each true effect in turn.
+        cases: cases; their sets are reweighed, with all effects and without each true effect in turn.
     """
     start = [Settings().values()[name] for name in ODDS]
 
     def log_probability(case: Case, chosen: WeighingSettings) -> float:
-        """Log probability of the truth, plus half that of ``unknown`` with every true effect withheld in turn."""
+        """Log probability of the truth, plus half the log probability of ``unknown`` without each true effect."""
         right = sum(p for names, p in case.answers(chosen=chosen) if case.right(names))
         total = float(np.log(max(right, _LEAST)))
         if case.truth != UNKNOWN:
@@ -275,7 +275,7 @@ def misses(folder: Path, count: int) -> Iterator[str]:
 
 
 def table(folder: Path, count: int, rerun: Sequence[str]) -> Iterator[str]:
-    """The table, line by line; ``rerun`` are further settings, by whole diagnoses."""
+    """The table, line by line; ``rerun`` names further settings, changed by whole diagnoses."""
     cases = read_cases(folder, count)
     yield "| setting | exact | false | log score | wrong set stated |\n|---|---|---|---|---|"
     yield tally(cases).row("as they are")

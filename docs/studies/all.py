@@ -1,4 +1,4 @@
-"""Make the pages of results, and all that is generated for the pages, by one command.
+"""Make the pages of results, and all generated parts of other pages, by one command.
 
     python -m docs.studies.all --list            # the pages, their dates, commands and times; nothing is run
     python -m docs.studies.all [PAGE ...]        # the named pages, or all; the same command continues
@@ -42,11 +42,11 @@ class Step:
     """A command of a page.
 
     Args:
-        command: in a shell's notation; ``{work}`` is the folder of intermediate files, ``{data}`` the folder of
-            measured campaigns, ``{seed}`` the seed of a blind set. ``tunnel`` and ``python`` are those of this
-            environment.
-        table: the mark in the page at which the table that the command prints stands; empty: the command writes
-            the page itself, or the page's author reads the output.
+        command: command in a shell's notation; ``{work}`` is the folder of intermediate files, ``{data}`` the
+            folder of measured campaigns, ``{seed}`` the seed of a blind set. ``tunnel`` and ``python`` are
+            those of this environment.
+        table: the mark in the page for the table that the command prints; empty: the command writes the page
+            itself, or the page's author reads the output.
     """
 
     command: str
@@ -58,12 +58,12 @@ class ResultPage:
     """A page, or a part of all pages, and the commands that make it.
 
     Args:
-        name: of the page below ``docs``, without ``.md``.
-        steps: in this order.
-        minutes: processor time of all steps, as the pages and `benchmarks` state it; 0 where none does.
+        name: name of the page below ``docs``, without ``.md``.
+        steps: steps in this order.
+        minutes: processor time of all steps, as stated by the pages and `benchmarks`; 0 if none states it.
         needs: data or extras that not every checkout has.
         dated: whether the page has figures and states the day on which they were made.
-        seed: of its blind set; None: it has none that should be fresh.
+        seed: seed of its blind set; None: it has no set that should be fresh.
     """
 
     name: str
@@ -178,11 +178,11 @@ PAGES = (
         dated=False,
     ),
 )
-"""The pages of results, and then what is generated for other pages; the examples of all pages come last."""
+"""The pages of results, and then the generated parts of other pages; the examples of all pages come last."""
 
 
 def code_digest() -> str:
-    """A digest of the sources that the figures depend on."""
+    """A digest of the sources that determine the figures."""
     digest = hashlib.sha256()
     for package in PACKAGES:
         for path in sorted((ROOT / package).rglob("*")):
@@ -196,7 +196,7 @@ class Work:
     """The folder of the commands' files.
 
     Args:
-        code: digest of the sources for which its results hold.
+        code: digest of the sources for which the results hold.
     """
 
     folder: Path
@@ -210,7 +210,7 @@ class Work:
         """Processor time of every finished command, min.
 
         Raises:
-            TunnelError: when the folder is of another state of the code.
+            TunnelError: when the folder belongs to another state of the code.
         """
         if not self._list.exists():
             return {}
@@ -232,7 +232,7 @@ def make(page: ResultPage, work: Work, given: Mapping[str, str]) -> float:
     """Run the commands of a page that are not finished.
 
     Args:
-        given: the places named in braces in the commands, by name.
+        given: values of the placeholders in braces in the commands, by name.
 
     Returns:
         Processor time of all its commands, also of those finished earlier, min.
@@ -283,7 +283,7 @@ def _run(command: str, printed: Path) -> float:
 
 
 def listed(pages: Sequence[ResultPage], given: Mapping[str, str]) -> str:
-    """What would be run, page by page, with the sum of the stated times."""
+    """The commands to be run, page by page, with the sum of the stated times."""
     lines = []
     for page in pages:
         facts = [
@@ -299,7 +299,7 @@ def listed(pages: Sequence[ResultPage], given: Mapping[str, str]) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """List or make the pages; exit status 0, or 2 for what cannot be made."""
+    """List or make the pages; exit status 0, or 2 for a page that cannot be made."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("names", nargs="*", metavar="PAGE", help="pages without .md; default: all")
     parser.add_argument("--list", action="store_true", help="print what would be run")

@@ -37,12 +37,12 @@ from tunnel_lab.envs.session import Knowledge
 from tunnel_sim.files.writing import write_whole
 from tunnel_sim.vocabulary.errors import TunnelError
 
-TRAINED_FROM = 1_000_000  # first seed of the training, far from those of the score
+TRAINED_FROM = 1_000_000  # first seed of the training, far from the seeds of the score
 STEPS = 90_000
-CAMPAIGNS = 16  # in parallel: one evaluation of the network for all
+CAMPAIGNS = 16  # number of campaigns in parallel: one evaluation of the network for all
 TRAINING: dict[str, Any] = {"sample_rate": 25.0, "noise_std": 0.025, "max_runs": 12}
-"""A quarter of the samples with half the noise hold the same information and take a quarter of the time. Campaigns
-of an untrained agent are cut off earlier."""
+"""A quarter of the samples with half the noise contain the same information and take a quarter of the time.
+Campaigns of an untrained agent are cut off earlier."""
 
 
 def make(count: int, **arguments: Any) -> NormalizeObservation:
@@ -50,7 +50,7 @@ def make(count: int, **arguments: Any) -> NormalizeObservation:
 
     Args:
         count: number of campaigns.
-        **arguments: of ``Campaign-v0``.
+        **arguments: arguments of ``Campaign-v0``.
     """
     space = gymnasium.spaces.Box(-np.inf, np.inf, (FEATURES,), np.float64)
 
@@ -65,8 +65,8 @@ def model_of(envs: NormalizeObservation, seed: int, **changes: Any) -> Any:
     """Stable-Baselines3's PPO with the settings of the stored agent.
 
     Args:
-        envs: normalised, in parallel.
-        seed: of network and environments.
+        envs: normalised parallel campaigns.
+        seed: seed of network and environments.
         **changes: other settings.
     """
     from stable_baselines3 import PPO
@@ -97,7 +97,7 @@ def train(steps: int, seed: int) -> Agent:
     """
     import torch
 
-    torch.set_num_threads(1)  # a second thread only costs time on so small a network
+    torch.set_num_threads(1)  # a second thread only costs time for so small a network
     envs = make(CAMPAIGNS, **TRAINING)
     model = model_of(envs, seed, verbose=1)
     model.learn(steps)
@@ -113,7 +113,7 @@ def score(agent: Agent, name: str = "trained") -> list[Row]:
     """Play the seeds of the score with an agent in the full simulation.
 
     Args:
-        name: of the policy in the rows.
+        name: name of the policy in the rows.
     """
     return play_all("identification", name, partial(_action, agent))
 
@@ -127,7 +127,7 @@ def write_score(docs: Path, rows: Sequence[Row]) -> None:
 
     Args:
         docs: the folder docs of the source tree.
-        rows: of one agent.
+        rows: rows of one agent.
     """
     stored = docs / "how-to" / "train-an-agent.csv"
     kept = [one for one in from_csv(stored.read_text(encoding="utf-8")) if one.policy != rows[0].policy]

@@ -47,7 +47,7 @@ ARGUMENTS: dict[str, dict[str, Any]] = {
         "max_runs": 8,
     },
 }
-"""What the environments are made with; two rivals instead of four, and noise that leaves run one short."""
+"""Settings of the environments; two rivals instead of four, and so much noise that one run is not enough."""
 _CONFIDENCE = 0.95
 _COLOUR = {"scripted": 0, "greedy": 1, "separating": 2}
 _GOAL = 0.05  # relative standard deviation of Cnr at which an identification ends
@@ -62,10 +62,10 @@ class Row:
         rig_time_s: rig time until the goal, or until the episode was cut off, s.
         reached: whether the goal was reached.
         on_first: whether it was reached with the first run.
-        right: whether the answer is the effect that acts; of an identification, whether Cnβ and Cnr are both
+        right: whether the answer is the acting effect; for an identification, whether Cnβ and Cnr are both
             within three standard deviations of the truth.
-        cn_beta_error: error of Cnβ over its standard deviation (1); of an identification.
-        cn_r_error: error of Cnr over its standard deviation (1); of an identification.
+        cn_beta_error: error of Cnβ over its standard deviation (1); for an identification.
+        cn_r_error: error of Cnr over its standard deviation (1); for an identification.
     """
 
     preset: str
@@ -84,8 +84,8 @@ def play(preset: str, policy: str, seed: int, use: Policy | None = None) -> Row:
     """Play one episode.
 
     Args:
-        policy: its name in the row.
-        use: the policy; None: that of `POLICIES` with the name.
+        policy: name of the policy in the row.
+        use: the policy; None: the policy of this name in `POLICIES`.
     """
     env = CampaignEnv(preset=preset, expose_truth=True, **ARGUMENTS[preset])
     info = run_campaign(env, POLICIES[policy] if use is None else use, seed=seed)
@@ -155,7 +155,7 @@ def median_interval(values: Array) -> tuple[float, float, float]:
     """The median with a distribution-free interval of at least 95 %.
 
     Args:
-        values: shape (n,).
+        values: values, shape (n,).
     """
     ordered = np.sort(values)
     # Of n values, those of ranks k+1 and n−k enclose the median unless at most k lie on one side of it.
@@ -171,7 +171,7 @@ def table(rows: Sequence[Row], preset: str, policies: Sequence[str] | None = Non
     """The comparison as a table in Markdown.
 
     Args:
-        policies: the others are compared with the first, seed by seed; those of `CONTESTS` where None.
+        policies: policies; the others are compared with the first, seed by seed; None: those of `CONTESTS`.
     """
     first, *others = CONTESTS[preset] if policies is None else policies
     lines = [
@@ -224,7 +224,7 @@ def fill(page: str, rows: Sequence[Row]) -> str:
 
 
 def example(seed: int = 0) -> dict[str, tuple[Array, Array]]:
-    """Decrease of Cnr's standard deviation with the rig time in one campaign, by policy.
+    """Standard deviation of Cnr against the rig time in one campaign, by policy.
 
     Returns:
         By policy: rig time [s] and relative standard deviation (1), each of shape (runs + 1,).
@@ -240,10 +240,10 @@ def example(seed: int = 0) -> dict[str, tuple[Array, Array]]:
 
 @styled
 def policies_figure(rows: Sequence[Row], followed: Mapping[str, tuple[Array, Array]]) -> Figure:
-    """One campaign of each policy, and the share of all that have reached the goal, against the rig time.
+    """One campaign of each policy, and the share of all campaigns that have reached the goal, against the rig time.
 
     Args:
-        followed: from `example`.
+        followed: campaigns from `example`.
     """
     fig = figure(WIDTH, 2.9)
     panels = fig.subplots(1, 3)
@@ -272,7 +272,7 @@ def policies_figure(rows: Sequence[Row], followed: Mapping[str, tuple[Array, Arr
         axes.set_xlim(0.0, None)
         grid(axes)
     known: dict[str, Any] = {}
-    for axes in panels[::-1]:  # a policy of the first panel is shown by that panel's line
+    for axes in panels[::-1]:  # a policy of the first panel is shown by its line in that panel
         known |= dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
     fig.legend(known.values(), known.keys(), loc="outside upper center", ncols=4)
     return fig

@@ -44,15 +44,15 @@ PUBLISHED = {
     "friction_moment": (20.4, "N"),
     "moment_offset": (3.2, "N"),
 }
-"""Of EMPS, values and units (Janot, Gautier and Brunot 2019, whose offset has the other sign)."""
+"""Values and units of EMPS (Janot, Gautier and Brunot 2019, who give the offset with the other sign)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Predicted:
-    """A model fitted to some of the blocks of a campaign, and all blocks predicted.
+    """A model fitted to some of the blocks of a campaign, and its predictions of all blocks.
 
     Args:
-        reading: by run id, shape (n,), in the unit of the reading.
+        reading: reading by run id, shape (n,), in the unit of the reading.
         error: reading minus prediction by run id, shape (n,), in the unit of the reading.
     """
 
@@ -90,7 +90,8 @@ def predicted(whole: Fit, seen: Sequence[NDArray[np.bool_]]) -> Predicted:
     """Fit some blocks, and predict all from the input.
 
     Args:
-        seen: fitted blocks by run, shape (n,). A run without any keeps its initial state of the fit to all blocks.
+        seen: mask of the fitted blocks by run, shape (n,). A run without any keeps its initial state in the fit
+            to all blocks.
     """
     runs = whole.problem.data.runs
     point, _ = fit_seen(whole, seen)
@@ -110,7 +111,7 @@ def gaps(campaign: Campaign, readings: Mapping[str, Array] | None = None) -> Cam
     """The free decays where the input is quiet before the end of each run.
 
     Args:
-        readings: by run id, at the samples of the record, rad; None: the recorded readings.
+        readings: readings by run id, at the samples of the record, rad; None: the recorded readings.
     """
     runs: list[Run] = []
     for run in campaign.runs:
@@ -140,7 +141,7 @@ def arrow_figure(nominal: Predicted, causes: Predicted, interval: float, reach: 
     """The arrow and the errors of both predictions, as the greatest value in every tenth of a second.
 
     Args:
-        interval: between blocks, s.
+        interval: interval between blocks, s.
         reach: largest reading of the multisines, V.
     """
     figure = Figure(figsize=(8.0, 3.4), layout="constrained")
@@ -165,7 +166,7 @@ def silverbox(campaign: Campaign, answer: Diagnosis, image: Path) -> str:
     Args:
         campaign: the arrow and the multisines.
         answer: the diagnosis of the multisines alone.
-        image: the figure to write.
+        image: file of the figure.
     """
     nominal, whole = fitted(campaign, answer)
     runs = whole.problem.data.runs
@@ -278,7 +279,7 @@ The validation record used in the literature is not among these data.
 
 
 def diagnosed(campaign: Campaign, answers: Path | None, name: str) -> Diagnosis:
-    """A diagnosis, read where it exists, otherwise made and kept."""
+    """A diagnosis, read if it exists, otherwise made and kept."""
     path = None if answers is None else answers / f"{name}.json"
     if path is not None and path.exists():
         return read_diagnosis(path)

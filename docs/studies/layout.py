@@ -28,7 +28,7 @@ PACKAGES = {
 WAYS = {
     "diagnosis": "the way of an answer: rooms up to patch → compose.py → findings, a file each → result.py"
 }
-"""By package, the way of its result through rooms and modules, where the order of imports does not show it."""
+"""By package, the way of its result through rooms and modules, if the order of imports does not show it."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Room:
     """A folder of a package, or a module at its top.
 
     Args:
-        layer: its place in the package's contract; a room imports only from rooms of greater number.
+        layer: its place in the package's contract; a room imports only from rooms with a greater number.
         summary: first line of its docstring.
     """
 
@@ -47,7 +47,7 @@ class Room:
 
     @property
     def is_folder(self) -> bool:
-        """Whether it contains modules."""
+        """Whether the room contains modules."""
         return (ROOT / self.package / self.name).is_dir()
 
 

@@ -45,26 +45,26 @@ FREE_DECAY: dict[str, Any] = {
     "noise_std": 0.005,
     "prior": {"cn_beta": 0.03, "cn_r": 0.03},
 }
-"""A run of 200 control periods, some seven in a cycle; by default it has 1000. The derivatives are known to 0.03
-from an earlier campaign. With the default prior, which knows next to nothing, the first half second gives most of
-the reward whatever the agent does, and hides what its actions add."""
+"""A run of 200 control periods, with some seven in a cycle; by default it has 1000. The derivatives are known
+to 0.03 from an earlier campaign. With the default prior, which is very wide, the first half second gives most
+of the reward whatever the agent does, and hides the contribution of its actions."""
 SETTINGS: dict[str, Any] = {
-    "n_steps": 200,  # a run
+    "n_steps": 200,  # one run
     "batch_size": 400,
     "gamma": 0.98,  # 50 control periods, 2.5 s: the wind follows its set-point in 2 s
     "ent_coef": 0.0,
     "learning_rate": 1e-3,
     "policy_kwargs": {"net_arch": [64, 64], "log_std_init": -0.5},
 }
-"""Of PPO for ``FreeDecay-v0``, where they differ from those of the stored agent."""
-RUNS = 16  # in parallel
+"""Settings of PPO for ``FreeDecay-v0`` that differ from the stored agent's."""
+RUNS = 16  # number of runs in parallel
 SEEDS = (0, 1)
 SWING = radians(20.0)  # rad, amplitude of the hand-written policy
 SPEEDS = (
     25.0,
     40.0,
 )  # m/s, wind speeds of the hand-written policy; the second is the limit, which the agent has too
-SHARE = 0.5  # of the spring's stiffness that the air may take at the speed that the policy sets by the spring
+SHARE = 0.5  # share of the spring's stiffness that the air may take at the speed chosen for the spring
 CURVES = ("FreeDecay-v0", "Campaign-v0")
 LENGTHS = {"FreeDecay-v0": 150_000, "Campaign-v0": 32_000}
 """Steps of each training: control periods, and runs."""
@@ -81,11 +81,11 @@ class Point:
 
     Args:
         policy: ``trained``, or a policy for comparison.
-        seed: of the training; 0 for a policy for comparison.
-        steps: of the training so far; 0 for a policy for comparison.
+        seed: seed of the training; 0 for a policy for comparison.
+        steps: steps of the training so far; 0 for a policy for comparison.
         nats: mean return of the episodes, nats.
-        std_error: of the mean, from the scatter between the episodes, nats.
-        episodes: their number.
+        std_error: standard error of the mean, from the scatter between the episodes, nats.
+        episodes: number of episodes.
     """
 
     environment: str
@@ -109,8 +109,8 @@ def play_runs(act: Callable[[Array], Array], begin: Callable[[dict[str, Any]], N
     """The returns of runs of ``FreeDecay-v0``, nats, shape (n,).
 
     Args:
-        act: actions, shape (n, 2), from observations, shape (n, p).
-        begin: called with the stated conditions, each shape (n,).
+        act: function from observations, shape (n, p), to actions, shape (n, 2).
+        begin: function called with the stated conditions, each of shape (n,).
     """
     count = EPISODES["FreeDecay-v0"]
     envs = gymnasium.make_vec("tunnel_sim/FreeDecay-v0", num_envs=count, nthread=1, **FREE_DECAY)
@@ -130,7 +130,7 @@ def play_campaigns(act: Callable[[Any], Any]) -> Array:
     """The returns of campaigns of ``Campaign-v0``, nats less rig time, shape (n,).
 
     Args:
-        act: the action in an environment during an episode.
+        act: function that gives the action in an environment during an episode.
     """
     env = gymnasium.make("tunnel_sim/Campaign-v0")
     returns = np.zeros(EPISODES["Campaign-v0"])
@@ -159,7 +159,7 @@ def untrained() -> list[Point]:
     from tunnel_sim.envs.engines import operator_action
     from tunnel_sim.envs.episode_conditions import CN_BETA, FreeDecayConfig
 
-    config, found = FreeDecayConfig(**FREE_DECAY), []
+    config, points = FreeDecayConfig(**FREE_DECAY), []
     rig = config.rig()
     policies: list[Callable[[Array], Array]] = []
 
@@ -192,11 +192,11 @@ def untrained() -> list[Point]:
     rules: list[tuple[str, Callable[[dict[str, Any]], None]]]
     rules = [("free decay", alone), *driven, ("resonant by spring", by_spring)]
     for name, begin in rules:
-        found.append(point("FreeDecay-v0", name, 0, 0, play_runs(each, begin)))
+        points.append(point("FreeDecay-v0", name, 0, 0, play_runs(each, begin)))
     for name, rule in (("scripted", scripted), ("greedy", greedy), (STORED, trained)):
         returns = play_campaigns(lambda env: rule(env.known))  # noqa: B023  called within the loop
-        found.append(point("Campaign-v0", name, 0, 0, returns))
-    return found
+        points.append(point("Campaign-v0", name, 0, 0, returns))
+    return points
 
 
 def train(environment: str, seed: int, steps: int) -> list[Point]:
@@ -218,14 +218,14 @@ def train(environment: str, seed: int, steps: int) -> list[Point]:
         mean, spread = statistics.mean.copy(), np.sqrt(statistics.var + envs.epsilon)
 
         def act(observation: Array) -> Array:
-            found: Array = model.predict((observation - mean) / spread, deterministic=True)[0]
-            return found
+            action: Array = model.predict((observation - mean) / spread, deterministic=True)[0]
+            return action
 
         if environment == "FreeDecay-v0":
             return play_runs(act)
         return play_campaigns(lambda env: act(features_of(env)))
 
-    found: list[Point] = []
+    points: list[Point] = []
 
     class Score(BaseCallback):
         """Scores the agent before a rollout whenever the number of steps has doubled."""
@@ -234,17 +234,17 @@ def train(environment: str, seed: int, steps: int) -> list[Point]:
 
         def _on_rollout_start(self) -> None:
             if self.num_timesteps >= self.next_steps:
-                found.append(point(environment, TRAINED, seed, self.num_timesteps, returns()))
-                print(found[-1], flush=True)
+                points.append(point(environment, TRAINED, seed, self.num_timesteps, returns()))
+                print(points[-1], flush=True)
                 self.next_steps = max(2 * self.num_timesteps, 1)
 
         def _on_step(self) -> bool:
             return True
 
     model.learn(steps, callback=Score())
-    if found[-1].steps < model.num_timesteps:
-        found.append(point(environment, TRAINED, seed, model.num_timesteps, returns()))
-    return found
+    if points[-1].steps < model.num_timesteps:
+        points.append(point(environment, TRAINED, seed, model.num_timesteps, returns()))
+    return points
 
 
 def features_of(env: Any) -> Array:
@@ -257,7 +257,7 @@ def to_csv(points: Sequence[Point]) -> str:
     text = io.StringIO()
     writer = csv.DictWriter(text, [item.name for item in fields(Point)], lineterminator="\n")
     writer.writeheader()
-    writer.writerows(asdict(one) for one in points)
+    writer.writerows(asdict(score) for score in points)
     return text.getvalue()
 
 
@@ -282,7 +282,7 @@ def curves(points: Sequence[Point]) -> Figure:
     """The scores over the steps of the training with 95 % intervals, a panel for each environment."""
     drawn = figure(WIDTH, 3.6)
     for axes, environment in zip(drawn.subplots(1, len(CURVES)), CURVES, strict=True):
-        _panel(axes, [one for one in points if one.environment == environment])
+        _panel(axes, [score for score in points if score.environment == environment])
         axes.set_title(environment)
         axes.set_xlabel(f"steps of the training: {STEP[environment]}")
     drawn.axes[0].set_ylabel("information in a run [nats]")
@@ -291,21 +291,21 @@ def curves(points: Sequence[Point]) -> Figure:
 
 
 def _panel(axes: Axes, points: Sequence[Point]) -> None:
-    mine = [one for one in points if one.policy == TRAINED]
-    first = min(one.steps for one in mine if one.steps)
+    mine = [score for score in points if score.policy == TRAINED]
+    first = min(score.steps for score in mine if score.steps)
     start = first / 2.0  # position of zero on the logarithmic axis
-    for place, seed in enumerate(sorted({one.seed for one in mine})):
-        line = [one for one in mine if one.seed == seed]
+    for place, seed in enumerate(sorted({score.seed for score in mine})):
+        line = [score for score in mine if score.seed == seed]
         axes.errorbar(
-            [max(one.steps, start) for one in line], [one.nats for one in line],
-            yerr=[INTERVAL * one.std_error for one in line],
+            [max(score.steps, start) for score in line], [score.nats for score in line],
+            yerr=[INTERVAL * score.std_error for score in line],
             color=COLOURS[place], marker=MARKERS[place], markersize=4.0, linewidth=1.0,
             label=f"agent, seed {seed}",
         )  # fmt: skip
-    for place, rule in enumerate(one for one in points if one.policy != TRAINED):
+    for place, rule in enumerate(score for score in points if score.policy != TRAINED):
         style = ("--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))[place]
         axes.axhline(rule.nats, color="0.4", linewidth=1.0, linestyle=style, label=rule.policy)
-    last = max(one.steps for one in mine)
+    last = max(score.steps for score in mine)
     marks = [mark for mark in (3e3, 1e4, 3e4, 1e5) if first <= mark <= last]
     axes.set_xscale("log")
     axes.set_xlim(0.8 * start, 1.2 * last)
@@ -318,24 +318,24 @@ def _panel(axes: Axes, points: Sequence[Point]) -> None:
 def fill(page: str, points: Sequence[Point]) -> str:
     """The page with the table of the scores over the steps, for each environment."""
     for environment in CURVES:
-        mine = [one for one in points if one.environment == environment]
-        seeds = sorted({one.seed for one in mine if one.policy == TRAINED})
+        mine = [score for score in points if score.environment == environment]
+        seeds = sorted({score.seed for score in mine if score.policy == TRAINED})
         lines = [
             f"| {STEP[environment]} | {' | '.join(f'agent, seed {seed} [nats]' for seed in seeds)} |",
             "|---" * (1 + len(seeds)) + "|",
         ]
-        for steps in sorted({one.steps for one in mine if one.policy == TRAINED}):
-            scores = {one.seed: one for one in mine if (one.policy, one.steps) == (TRAINED, steps)}
+        for steps in sorted({score.steps for score in mine if score.policy == TRAINED}):
+            scores = {score.seed: score for score in mine if (score.policy, score.steps) == (TRAINED, steps)}
             lines.append(f"| {steps:,} | {' | '.join(_cell(scores[seed]) for seed in seeds)} |")
-        for one in mine:
-            if one.policy != TRAINED:
-                lines.append(f"| *{one.policy}* | {' | '.join([_cell(one)] + [''] * (len(seeds) - 1))} |")
+        for score in mine:
+            if score.policy != TRAINED:
+                lines.append(f"| *{score.policy}* | {' | '.join([_cell(score)] + [''] * (len(seeds) - 1))} |")
         page = replaced(page, environment, "\n".join(lines))
     return page
 
 
-def _cell(one: Point) -> str:
-    return f"{one.nats:.2f} ± {INTERVAL * one.std_error:.2f}".replace("-", "−")
+def _cell(score: Point) -> str:
+    return f"{score.nats:.2f} ± {INTERVAL * score.std_error:.2f}".replace("-", "−")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

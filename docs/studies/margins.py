@@ -1,4 +1,4 @@
-"""The decisions that change with a setting of half or twice its size, on campaigns of known truth.
+"""The decisions that change when a setting is halved or doubled, on campaigns of known truth.
 
     python -m docs.studies.margins FOLDER [FOLDER ...] [--count N] [--kept FILE]
 
@@ -32,16 +32,16 @@ from tunnel_sim.vocabulary.errors import TunnelError
 
 FACTORS = (0.5, 2.0)
 
-#: By setting: number of comparisons, and of changed ones at each factor, since `watched` was called.
+#: Number of comparisons by setting, and of changed ones at each factor, since `watched` was called.
 Counts = defaultdict[str, list[int]]
 _counts: Counts = defaultdict(lambda: [0, 0, 0])
 
 
 class Watched(float):
-    """A number that tracks its values under other sizes of the settings behind it.
+    """A number that tracks the values it would have with other sizes of the settings behind it.
 
     Args:
-        at: by name of a setting, its value at each of `FACTORS`.
+        at: values at each of `FACTORS`, by name of a setting.
     """
 
     at: Mapping[str, tuple[float, ...]]
@@ -68,7 +68,7 @@ def _plain(value: Any) -> Any:
 
 
 def _moved(inputs: Sequence[Any], name: str, place: int) -> list[Any]:
-    """The inputs at a factor of a setting; numbers that do not depend on it are unchanged."""
+    """The inputs at a factor of a setting; numbers that do not depend on the setting are unchanged."""
     return [
         one.at[name][place] if isinstance(one, Watched) and name in one.at else _plain(one) for one in inputs
     ]
@@ -79,7 +79,7 @@ def _names(inputs: Sequence[Any]) -> set[str]:
 
 
 def _followed(operate: Callable[..., Any], inputs: Sequence[Any], result: Any) -> Watched:
-    """The result with its other values."""
+    """The result with its values under other settings."""
     places = range(len(FACTORS))
     with np.errstate(all="ignore"):
         at = {n: tuple(float(operate(*_moved(inputs, n, place))) for place in places) for n in _names(inputs)}
@@ -87,7 +87,7 @@ def _followed(operate: Callable[..., Any], inputs: Sequence[Any], result: Any) -
 
 
 def _compared(compare: Callable[..., Any], inputs: Sequence[Any], result: Any) -> Any:
-    """The result; changes at other factors are counted."""
+    """The result of a comparison; changes at other factors are counted."""
     for name in _names(inputs):
         _counts[name][0] += 1
         for place in range(len(FACTORS)):
@@ -115,7 +115,7 @@ _COMPARISONS = (np.less, np.less_equal, np.greater, np.greater_equal)
 
 
 def watched() -> tuple[Settings, Counts]:
-    """The usual settings with all non-integer ones watched, and the counts of their comparisons from now."""
+    """The usual settings with all non-integer settings watched, and the counts of their comparisons from now."""
     _counts.clear()
     usual = Settings()
     numbers = {
@@ -130,7 +130,7 @@ def table(folders: list[Path], count: int, known: dict[str, Any], kept: Path | N
     """Rows of Markdown, one for every non-integer setting.
 
     Args:
-        count: number of campaigns of each folder, from the first.
+        count: number of campaigns of each folder, counted from the first.
         known: earlier counts by campaign; counts of further campaigns are added.
         kept: the file for the counts.
     """

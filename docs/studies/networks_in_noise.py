@@ -41,7 +41,7 @@ def ratio_of(errors: Array, bound: float) -> Ratio:
     """RMS over a bound, with the interval of a normal error's variance.
 
     Args:
-        errors: shape (n,).
+        errors: errors, shape (n,).
         bound: standard deviation, in the errors' unit.
     """
     value, count = float(np.sqrt(np.mean(errors**2))) / bound, errors.size
@@ -55,8 +55,8 @@ class NoiseRow:
 
     Args:
         zeta: true damping ratio.
-        window: of the networks on the first three cycles, over the bound of these cycles.
-        runs: by method on the whole record, over the bound of the whole record; None where any fit fails.
+        window: error of the networks on the first three cycles, over the bound of these cycles.
+        runs: error by method on the whole record, over the bound of the whole record; None if any fit fails.
         coverage: share of the networks' 95 % intervals that contain the truth, ratio.
     """
 
@@ -81,7 +81,7 @@ def noise_row(
         zeta: damping ratio.
         omega_n: natural frequency, rad/s.
         noise: standard deviation, rad.
-        duration: of a record, s.
+        duration: duration of a record, s.
     """
     time, angle = np.arange(round(1000.0 * duration)) / 1000.0, float(np.radians(20.0))
     clean = free_decay(time, Decay.from_modal(omega_n, zeta), angle, 0.0)

@@ -24,7 +24,7 @@ _LABELS = {
     "yaw_inertia": "Izz",
     "mechanical_damping": "Cr",
 }
-_BAND = 1.358  # of Kolmogorov's statistic at 95 %, times the root of the number
+_BAND = 1.358  # 95 % point of Kolmogorov's statistic, times the root of the number
 
 
 def rows_of(paths: Sequence[Path]) -> list[Row]:

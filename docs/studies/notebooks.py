@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 FOLDER = Path(__file__).parents[1] / "notebooks"
-LONGEST_S = 600.0  # of a cell, on a busy machine
+LONGEST_S = 600.0  # time limit of a cell, on a busy machine
 
 
 def executed(path: Path) -> Any:

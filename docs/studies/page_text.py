@@ -16,7 +16,7 @@ def replaced(page: str, name: str, text: str) -> str:
 
 
 def made_on(page: str) -> str:
-    """The day that a page states for its figures, such as ``25 November 2026``; empty where it states none."""
+    """The day that a page states for its figures, such as ``25 November 2026``; empty if it states none."""
     found = _MADE.search(page)
     return found[1] if found else ""
 
@@ -34,7 +34,7 @@ def stamped(page: str, name: str, day: date, minutes: float) -> str:
 
 
 def as_stamped(page: str, earlier: str) -> str:
-    """A page with the day and the command that its earlier version states; unchanged where that states none."""
+    """A page with the day and the command of its earlier version; unchanged if that states none."""
     found = _MADE.search(earlier)
     if not found:
         return page
@@ -43,5 +43,5 @@ def as_stamped(page: str, earlier: str) -> str:
 
 
 def table_in(printed: str) -> str:
-    """The lines of the table that a command prints, without the others."""
+    """The lines of the table that a command prints, without other lines."""
     return "\n".join(line for line in printed.splitlines() if line.startswith("|"))

@@ -1,6 +1,6 @@
 """Planned drives against free decays: ``python -m docs.studies.planned_drives docs`` fills the page's table.
 
-Both plans of a case take the same rig time. Bounds are those of `tunnel plan`; errors are those of estimates from
+Both plans of a case take the same rig time. The bounds are from `tunnel plan`; the errors are from estimates of
 simulated campaigns, by output error in still air and by filter error in buffeting.
 """
 
@@ -25,9 +25,9 @@ from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.files.writing import write_whole
 
 SEEDS = 40
-LIMITS = Limits(moment=0.5, angle=radians(20.0))  # the angle is that of the releases
-MISTAKE = 0.02  # relative, of the prior guess of Izz
-INTENSITY = 0.02  # of the buffeting: the example of the vocabulary
+LIMITS = Limits(moment=0.5, angle=radians(20.0))  # the angle limit equals the release angle
+MISTAKE = 0.02  # relative error of the prior guess of Izz
+INTENSITY = 0.02  # size of the buffeting: the example of the vocabulary
 PAUSE = 60.0  # s of rig time before each record, as `tunnel plan` assumes
 PLAN = """
 name = "study"
@@ -57,7 +57,7 @@ class Case:
     Args:
         drive: kind and number of frequencies of the planned drive.
         bounds: Cnβ and Cnr of the free decays, then of the planned drive, 1/rad.
-        wrong: with a prior guess of Izz 2 % too small or too large: the lesser ratio of Cnr's bounds (1) and the
+        wrong: for a prior guess of Izz 2 % too small or too large, the lesser ratio of Cnr's bounds (1) and the
             larger peak of the response (rad).
         errors: root-mean-square errors of the estimates, in the order of ``bounds``, 1/rad; empty if not simulated.
     """
@@ -74,7 +74,7 @@ def document_of(name: str, *, buffeted: bool) -> PlanDocument:
     """The free decays of a case.
 
     Args:
-        name: one of `PLANS`.
+        name: name in `PLANS`.
     """
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "plan.toml"
@@ -88,8 +88,8 @@ def compare(name: str, *, buffeted: bool, seeds: int = SEEDS) -> Case:
     """One case.
 
     Args:
-        name: one of `PLANS`.
-        seeds: number of simulated campaigns of each plan; 0 gives the bounds alone.
+        name: name in `PLANS`.
+        seeds: number of simulated campaigns for each plan; 0 gives the bounds alone.
     """
     free, rig = document_of(name, buffeted=buffeted), load_rig()
     duration = free.repeats * (free.duration + PAUSE) - PAUSE

@@ -43,13 +43,13 @@ def greedy(known: Knowledge) -> Action:
 
     It maximises, over the whole menu, the expected information gain (exact Fisher information at the present
     estimate; Izz, Cr, the sensor's zero and every release unknown) divided by the run's cost. Runs that might
-    diverge are left out; where all might, it is the scripted run.
+    diverge are left out; if all might, the result is the scripted run.
     """
     return _best(known, lambda choice: expected_gain(known, choice))
 
 
 def _best(known: Knowledge, gain: Callable[[RunChoice], float]) -> Action:
-    """The action with the largest gain per rig time; the scripted one where no action has a gain."""
+    """The action with the largest gain per rig time; the scripted action if no action has a gain."""
     best, chosen = 0.0, None
     for action in known.conditions.menu.actions():
         choice = known.conditions.menu.choice(action)
@@ -60,7 +60,7 @@ def _best(known: Knowledge, gain: Callable[[RunChoice], float]) -> Action:
 
 
 def expected_gain(known: Knowledge, choice: RunChoice) -> float:
-    """Expected information of a run on (Cnβ, Cnr), nats; 0 where the run might diverge."""
+    """Expected information of a run on (Cnβ, Cnr), nats; 0 if the run might diverge."""
     conditions = known.conditions
     after = expected_belief(
         known.belief,
@@ -76,9 +76,9 @@ def separating(known: Knowledge) -> Action:
     """The run that best distinguishes the two most probable answers per rig time.
 
     It maximises, over the whole menu, half the squared separation of the two fitted models (the expected
-    log-likelihood ratio, nats; see `diagnosis.findings.next_run.separation`) divided by the run's cost. If only one
-    effect is named, its rival is the nominal model. Without a detected gap, or without a run with wind, the fitted
-    models cannot predict other runs, and it is the scripted run.
+    log-likelihood ratio, nats; see `diagnosis.findings.next_run.separation`) divided by the run's cost. If only
+    one effect is named, its rival is the nominal model. Without a detected gap, or without a run with wind, the
+    fitted models cannot predict other runs, and the result is the scripted run.
     """
     rivals = None if known.study is None else best_rivals(known.study)
     if rivals is None or not rivals[0].problem.data.wind_on:
@@ -100,9 +100,9 @@ def separating(known: Knowledge) -> Action:
 
 
 def best_rivals(study: Study) -> tuple[Fit, Fit] | None:
-    """The fits of the two most probable answers; the second is nominal where only one effect is fitted.
+    """The fits of the two most probable answers; the second is nominal if only one effect is fitted.
 
-    None where no effect is fitted.
+    None if no effect is fitted.
     """
     fits = [answer.hypothesis.fit for answer in study.answers if answer.hypothesis is not None]
     if not fits:

@@ -1,4 +1,4 @@
-"""Run the examples of the pages and write what they print below them.
+"""Run the examples of the pages and write their printed output below them.
 
 ``python -m docs.studies.quotes`` in the source tree; with names, only those pages, such as ``how-to/run-the-demo``.
 
@@ -26,10 +26,10 @@ BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 TRAINED = "how-to/train-an-agent"
 """A page whose examples take minutes; ``tests/architecture/test_agent_page.py`` runs shorter ones."""
 _END = "-- end of a step --"
-_MORE = "…\n"  # the last line of an excerpt
+_MORE = "…\n"  # mark of the last line of an excerpt
 _COMMAND = re.compile(r"^\$ (.*)\n", re.MULTILINE)
 _NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]\d+)?")
-_LAST_DIGITS = 3  # that may differ; what is shown is given to two digits of the std
+_LAST_DIGITS = 3  # number of last digits that may differ; shown values have two digits of the std
 
 
 @dataclass(frozen=True)
@@ -37,10 +37,10 @@ class Quote:
     """An example on a page.
 
     Args:
-        source: a command, or Python code.
+        source: command, or Python code.
         console: whether it is a command.
         shown: the text shown below it; empty where there is none.
-        place: of that text in the page, from and to; of code without text, the end of its block, twice.
+        place: start and end of that text in the page; for code without text, the end of its block, twice.
     """
 
     source: str
@@ -68,7 +68,7 @@ def quotes(page: str) -> list[Quote]:
 
 
 def pages() -> list[str]:
-    """The pages that show what their examples print, by path without ending: in ``docs``, and ``README``."""
+    """The pages with examples, by path without ending: in ``docs``, and ``README``."""
     files = {path.relative_to(DOCS).with_suffix("").as_posix(): path for path in sorted(DOCS.rglob("*.md"))}
     files["README"] = ROOT / "README.md"  # the index of docs has no example
     quoting = [
@@ -83,7 +83,7 @@ def path_of(name: str) -> Path:
 
 
 def outputs(page: str, folder: Path) -> list[str]:
-    """What the examples of a page print, in order: first its commands are run in the folder, then its code."""
+    """The output of a page's examples, in order: first its commands are run in the folder, then its code."""
     examples = quotes(page)
     said = {}
     if any(one.console for one in examples):
@@ -99,16 +99,16 @@ def outputs(page: str, folder: Path) -> list[str]:
 
 
 def printed(codes: Sequence[str], folder: Path) -> list[str]:
-    """What the steps of a script print, without a warning."""
+    """The output of the steps of a script, without a warning."""
     script = "".join(f"{code}\nprint({_END!r})\n" for code in codes)
     return _run(["-W", "error", "-c", script], folder).split(_END + "\n")[:-1]
 
 
 def refreshed(page: str, said: Sequence[str]) -> str:
-    """A page with what its examples print.
+    """A page with the output of its examples.
 
     Args:
-        said: by example, as from `outputs`.
+        said: output by example, from `outputs`.
     """
     for one, real in reversed(list(zip(quotes(page), said, strict=True))):
         excerpt = one.shown.endswith(_MORE)
@@ -152,7 +152,7 @@ def _comparable(lines: Sequence[str]) -> list[str]:
 
 
 def _prepare(page: str, folder: Path) -> None:
-    """The files that the commands of a page take: the plan of the README, measured data, and tables of the page."""
+    """The files for the commands of a page: the plan of the README, measured data, and tables of the page."""
     readme = BLOCK.findall((ROOT / "README.md").read_text("utf-8"))
     (plan,) = (text for kind, text in readme if kind == "toml" and "wind_speeds" in text)
     (folder / "plan.toml").write_text(plan, "utf-8")
@@ -167,7 +167,7 @@ def _prepare(page: str, folder: Path) -> None:
 
 
 def _run(words: Sequence[str], folder: Path) -> str:
-    """What Python prints, in a terminal of 80 columns without colours."""
+    """The output of Python, in a terminal of 80 columns without colours."""
     shown = {"PYTHONPATH": str(ROOT), "COLUMNS": "80", "NO_COLOR": "1"}
     done = subprocess.run(
         [sys.executable, *words],

@@ -20,15 +20,15 @@ from tunnel_sim.vocabulary.errors import TunnelError
 
 PAGE = Path(__file__).parents[1] / "real-records.md"
 SINE, DRY, QUADRATIC = "gravity_stiffness", "coulomb_friction", "quadratic_damping"
-_KEY_PARAMETERS = 4  # shown of each answer
+_KEY_PARAMETERS = 4  # number of parameters shown for each answer
 
 
 @dataclass(frozen=True)
 class Expected:
-    """The causes in a record, by its source or an energy balance.
+    """The causes in a record, according to its source or an energy balance.
 
     Args:
-        causes: all required causes; ``unknown`` where no effect of the vocabulary explains the record.
+        causes: all required causes; ``unknown`` if no effect of the vocabulary explains the record.
         also: further permitted causes.
         words: required text in verdict or cautions; empty: none.
         why: the known facts, in a sentence.
@@ -155,7 +155,8 @@ def main() -> None:
         row, text = section(name, answer, images)
         mark = "" if name in MEASURED_CAMPAIGNS else "*"
         parts.append((row.replace(f"(#{name})", f"(#{name}){mark}", 1), text))
-        PAGE.write_text(page(parts), encoding="utf-8")  # after each, since a diagnosis may take minutes
+        # after each record, since a diagnosis may take minutes
+        PAGE.write_text(page(parts), encoding="utf-8")
         print(row, flush=True)
 
 

@@ -13,11 +13,11 @@ from tunnel_sim.vocabulary.plan import Truth
 
 
 def reference_campaigns(count: int, seed: int, *, softening: bool) -> list[tuple[Campaign, Truth]]:
-    """Campaigns of the reference simulator, whose integrator and laws are independent of the virtual rig.
+    """Campaigns of the reference simulator; its integrator and laws are independent of the virtual rig.
 
     Args:
         count: number of campaigns, each with different conditions and truth.
-        softening: with a spring that softens and a damping that grows with the amplitude, as in `SOFTENING`.
+        softening: whether the spring softens and the damping grows with the amplitude, as in `SOFTENING`.
     """
     from tunnel_reference.draw import CampaignDraw, EffectDraw, draw_conditions
     from tunnel_reference.forms import forms_of

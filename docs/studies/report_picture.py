@@ -42,7 +42,7 @@ def report(folder: Path) -> Path:
 
 def draw(page_file: Path, picture: Path) -> None:
     """Take the picture of the head of a page, in the light colour scheme."""
-    from playwright.sync_api import sync_playwright  # only here: an extra of the developers
+    from playwright.sync_api import sync_playwright  # imported here because it is an extra of the developers
 
     with sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=find_browser())

@@ -26,11 +26,11 @@ class Resonant:
     every reading. The moment follows from their prediction for the coming period.
 
     Args:
-        config: of the environment.
-        stiffness: of spring and air together, N m/rad; an error of a few per cent is harmless.
+        config: configuration of the environment.
+        stiffness: stiffness of spring and air together, N m/rad; an error of a few per cent is harmless.
         inertia: Izz, kg m²; an error of a few per cent is harmless.
-        wind_speed: set-point, m/s.
-        amplitude: of the swing, rad.
+        wind_speed: wind-speed set-point, m/s.
+        amplitude: desired amplitude of the swing, rad.
 
     Raises:
         EnvError: when stiffness, inertia or amplitude is not a positive number.

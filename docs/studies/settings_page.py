@@ -1,4 +1,4 @@
-"""Write the page of all numbers by which the diagnosis decides: settings, and constants of the code.
+"""Write the page of all deciding numbers of the diagnosis: settings, and constants of the code.
 
     python -m docs.studies.settings_page
 
@@ -54,12 +54,12 @@ _SENTENCES = re.compile(rf"(.+?\.) (({_ORIGINS})( \(decision (\d{{4}})\))?\..*)"
 
 @dataclass(frozen=True)
 class Constant:
-    """A number of the code that decides.
+    """A deciding number of the code.
 
     Args:
-        file: where it stands, from the root.
-        value: in the unit that its meaning states.
-        said: its docstring on one line, empty without one.
+        file: path of its file, from the root.
+        value: value in the unit that its meaning states.
+        said: docstring on one line, empty without one.
     """
 
     file: str

@@ -27,9 +27,9 @@ class BaselinesVecEnv(VecEnv):
     """A vector environment of Gymnasium as one of Stable-Baselines3.
 
     Args:
-        envs: the native ``gymnasium.make_vec("tunnel_sim/FreeDecay-v0", ...)``, or a ``SyncVectorEnv`` whose
-            observations are boxes; either may be in Gymnasium's ``NormalizeObservation``, but in no other wrapper.
-        options: of every reset; the other properties are drawn.
+        envs: the native ``gymnasium.make_vec("tunnel_sim/FreeDecay-v0", ...)``, or a ``SyncVectorEnv`` with box
+            observations; either may be in Gymnasium's ``NormalizeObservation``, but in no other wrapper.
+        options: options of every reset; the other properties are drawn.
     """
 
     def __init__(self, envs: VectorEnv[Any, Any, Any], options: dict[str, Any] | None = None) -> None:
@@ -91,7 +91,7 @@ class BaselinesVecEnv(VecEnv):
     def env_method(
         self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any
     ) -> list[Any]:
-        """Call a method of the vector environment whose first argument is the index of a run."""
+        """Call a method of the vector environment that takes the index of a run as its first argument."""
         method = getattr(self._inner, method_name)
         return [method(row, *method_args, **method_kwargs) for row in self._get_indices(indices)]
 

@@ -25,7 +25,7 @@ _SMALLEST = 1e-12  # least standard deviation: keeps its logarithm finite
 
 
 def features(observation: Mapping[str, Array]) -> Array:
-    """The observation of the identification preset in numbers of order one to ten, shape (20,).
+    """The observation of the identification preset, scaled to numbers of order one to ten, shape (20,).
 
     Estimate [SI], ln of its four standard deviations, their six correlations, the last run [SI], runs made and rig
     time [s].
@@ -42,8 +42,8 @@ class Agent:
     """A network and its normalisation.
 
     Args:
-        mean: of the features, shape (20,).
-        variance: of the features, shape (20,).
+        mean: mean of the features, shape (20,).
+        variance: variance of the features, shape (20,).
         layers: weights and biases, shapes (outputs, inputs) and (outputs,).
         menu: menu of the training, in the format of `menu_text`.
     """
@@ -116,6 +116,6 @@ def trained(known: Knowledge) -> Action:
     """The policy of the stored agent; for the identification preset.
 
     Raises:
-        TunnelError: when the menu is not that preset's.
+        TunnelError: when the menu is not the menu of that preset.
     """
     return stored_agent().action(known.observation(), known.conditions.menu)

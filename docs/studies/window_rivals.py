@@ -23,16 +23,16 @@ from tunnel_sim.effects.capabilities import OwnNumbers
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
-_SCAN = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)  # severities tried first, in the effect's own scale
-_STEP = 0.01  # of the finite differences, in units of the parameters' scales
-_FAR = 1e3  # residual where a trial does not oscillate through the table, in standard deviations
-_SCALES = (0.02, 5e-4)  # of the base ωn (rad/s) and ζ
+_SCAN = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)  # first tried severities, in the effect's own scale
+_STEP = 0.01  # step of the finite differences, in units of the parameters' scales
+_FAR = 1e3  # residual of a trial that does not oscillate through the table, in standard deviations
+_SCALES = (0.02, 5e-4)  # scales of the base ωn (rad/s) and ζ
 _SLOWEST, _LEAST_ZETA, _MOST_ZETA = 0.1, 0.05, 0.2  # bounds of the base: a share of ωn, and ζ
-_ADJUSTMENTS = 3  # of the base, which a severe effect changes considerably
+_ADJUSTMENTS = 3  # rounds of adjusting the base, which a severe effect changes considerably
 _MOVES = (
     3.84  # decrease of a column's χ² exceeded by chance once in twenty: more shows an effect on the column
 )
-#: Odds of 20:1 as a difference of BIC; less is "cannot be distinguished".
+#: Odds of 20:1 as a difference of BIC; smaller differences count as "cannot be distinguished".
 DISTINGUISHED = 2.0 * log(20.0)
 
 Kinds = tuple[type[Effect], ...]
@@ -46,11 +46,11 @@ class Explanation:
         effects: with their fitted severities; empty for the linear model.
         omega_n: base natural frequency, before the effects are added, rad/s.
         zeta: base damping ratio.
-        columns: as simulated and windowed.
+        columns: simulated columns, windowed like the table.
         chi2_zeta: sum of squared residuals of the ζ column over its scatter², dimensionless.
         chi2_omega: sum of squared residuals of the ωn column over its scatter², dimensionless.
         bic: Bayesian information criterion, dimensionless.
-        probability: among the weighed hypotheses, with equal priors, a fraction.
+        probability: probability among the weighed hypotheses, with equal priors, a fraction.
     """
 
     effects: tuple[Effect, ...]
@@ -80,7 +80,7 @@ class WindowDiagnosis:
     Args:
         measured: the table, with the mean of an entry's two readings.
         std: scatter of every entry.
-        explanations: best first.
+        explanations: explanations, best first.
         flat: names of effects without influence on either column, which the table cannot show.
     """
 
@@ -237,7 +237,7 @@ class _Task:
         return _residuals(columns, self.measured, self.std)
 
     def scan(self, kind: type[Effect]) -> Array | None:
-        """The start of a fit: the severity whose columns fit best with an adjusted base."""
+        """The start of a fit: the severity with the best-fitting columns for an adjusted base."""
         info = kind.parameters()[0]
         best, least = None, np.inf
         for unit in (sign * size for size in _SCAN for sign in (1.0, -1.0)):

@@ -28,9 +28,9 @@ from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig
 
 CYCLES = 3
-_POINTS = 100  # per window, as for the paper's first network
+_POINTS = 100  # number of points per window, as for the paper's first network
 _RATE = 250.0  # Hz of the simulated reading
-_TREND = 2  # degree of the smooth trend whose residual is the table's scatter
+_TREND = 2  # degree of the smooth trend; its residual is the table's scatter
 
 
 @dataclass(frozen=True)
@@ -41,8 +41,8 @@ class RigState:
         spring_stiffness: Kr, N m/rad.
         wind_speed: V, m/s; 0 is wind-off.
         derivatives: Cnβ and Cnr, 1/rad.
-        release_angle: rad. It scales severities (a cubic one as its inverse square) and nothing else, except for
-            effects with a characteristic angle.
+        release_angle: release angle, rad. It only scales severities (a cubic one as its inverse square), except
+            for effects with a characteristic angle.
         air_density: ρ, kg/m³.
     """
 
@@ -134,11 +134,11 @@ def simulate_windows(
         effects: effects to add to the linear model; none with a random part, because one table is a single draw.
         omega_n: base natural frequency in the state ``base``, rad/s.
         zeta: base damping ratio there.
-        count: of consecutive windows of three cycles from the release on.
+        count: number of consecutive windows of three cycles from the release on.
         base: the state of the base ωn and ζ; None: ``state`` itself.
 
     Returns:
-        Both columns; None where the motion does not oscillate through all windows.
+        Both columns; None if the motion does not oscillate through all windows.
 
     Raises:
         TunnelError: when an effect has a random part.
@@ -198,7 +198,7 @@ def _window(curve: CubicSpline, begin: float, decay: Decay) -> Decay | None:
     own = np.linspace(0.0, _length(decay), _POINTS)
     if begin + own[-1] > curve.x[-1]:
         return None
-    with np.errstate(invalid="ignore"):  # a body at rest fits no decay, and the fit says so
+    with np.errstate(invalid="ignore"):  # a body at rest fits no decay, and the fit reports it
         fit = fit_run(Reading(own, np.asarray(curve(begin + own))), decay)
     return fit.runs[0].decay if fit.runs and fit.runs[0].decay.omega_d > 0.0 else None
 

@@ -77,7 +77,7 @@ def prior_belief(mean: Mapping[str, float], std: Mapping[str, float]) -> Belief:
 
     Args:
         mean: by name, in the units of `identification.estimate.UNITS`.
-        std: their standard deviations by name, in the same units, above 0.
+        std: standard deviations by name, in the same units, above 0.
     """
     shared = shared_parameters(mean)
     jacobian = derivatives(_DESIGN, shared).jacobian
@@ -88,13 +88,13 @@ def prior_belief(mean: Mapping[str, float], std: Mapping[str, float]) -> Belief:
 
 
 def shared_parameters(values: Mapping[str, float]) -> Array:
-    """φ, shape (4,), SI, of coefficients by name, in the units of `identification.estimate.UNITS`."""
+    """φ, shape (4,), SI, from coefficients by name, in the units of `identification.estimate.UNITS`."""
     scaled = [1.0, values["cn_beta"], values["mechanical_damping"], values["cn_r"]]
     return np.array(scaled) / values["yaw_inertia"]
 
 
 def run_link(run: Run, rig: RigProperties) -> Array:
-    """How a run's decay rate a [1/s] and stiffness k [1/s²] depend on φ: (a, k) = L φ, shape (2, 4).
+    """Dependence of a run's decay rate a [1/s] and stiffness k [1/s²] on φ: (a, k) = L φ, shape (2, 4).
 
     Raises:
         ValueError: when the run states no spring stiffness.
@@ -112,8 +112,8 @@ def update_belief(
     """The posterior after all runs of a campaign: one joint fit with the prior, not run by run.
 
     Args:
-        runs: readings and their own fits, which only start the joint one.
-        noise_std: of the reading, quantisation included, rad.
+        runs: readings and their single-run fits, which only start the joint fit.
+        noise_std: noise of the reading, quantisation included, rad.
 
     Raises:
         ValueError: when the joint fit does not converge.
@@ -122,7 +122,7 @@ def update_belief(
         return prior
     variance = noise_std**2
     known = prior.information[:4, :4] * variance
-    # It starts from the (a, k) of the runs, weighted by their information, and the prior.
+    # the start: the (a, k) of the runs, weighted by their information, and the prior
     normal, right = known.copy(), known @ prior.shared
     for link, (_, own) in zip(links, runs, strict=True):
         weight = eliminate(own.information, own.score, 2)[0]
@@ -141,10 +141,10 @@ def expected_belief(
     """The belief after one more run, released at rest: the same values with more information.
 
     Args:
-        link: of the run, see `run_link`, shape (2, 4).
-        time: its sample times since the release, shape (n,), s.
-        angle: of the release, rad.
-        noise_std: of the reading, quantisation included, rad.
+        link: link of the run, see `run_link`, shape (2, 4).
+        time: sample times since the release, shape (n,), s.
+        angle: release angle, rad.
+        noise_std: noise of the reading, quantisation included, rad.
 
     Returns:
         None where the stiffness or the damping of the run might not be positive, within three standard
@@ -180,10 +180,10 @@ class LinearRun:
 
     Args:
         link: from φ to (a, k), shape (2, 4); see `run_link`.
-        time: its sample times since the release, shape (n,), s.
-        angle: of the release, rad; the model is released at rest.
+        time: sample times since the release, shape (n,), s.
+        angle: release angle, rad; the model is released at rest.
         found: the estimate of a [1/s], k [1/s²] and the sensor's zero [rad], shape (3,).
-        weight: S, shape (3, 3).
+        weight: S, the information on ``found``, shape (3, 3).
     """
 
     link: Array
@@ -204,10 +204,10 @@ def linear_run(
 
     Args:
         link: from φ to (a, k), shape (2, 4).
-        time: its sample times since the release, shape (n,), s.
-        angle: of the release, rad.
-        zero: the true one, rad.
-        noise: of the reading, shape (n,), rad.
+        time: sample times since the release, shape (n,), s.
+        angle: release angle, rad.
+        zero: true zero of the sensor, rad.
+        noise: noise of the reading, shape (n,), rad.
     """
     information, score = linearised_at(time, decay, angle, 0.0, noise)
     if not determined(information):
@@ -218,20 +218,20 @@ def linear_run(
 
 
 def shows_a_decay(motion: Array, noise_std: float) -> bool:
-    """Whether a motion exceeds the noise, as `identify_run` demands.
+    """Whether a motion exceeds the noise, as `identify_run` requires.
 
     Args:
         motion: angle from the sensor's zero, shape (n,), rad.
-        noise_std: of the reading, rad.
+        noise_std: noise of the reading, rad.
     """
     return float(motion @ motion) >= LEAST_ENERGY * noise_std**2
 
 
 def linear_belief(prior: Belief, runs: Sequence[LinearRun], noise_std: float) -> Belief:
-    """The posterior after runs: its weights are Fisher's information at the likeliest φ, as in `update_belief`.
+    """The posterior after runs, weighted by Fisher's information at the most likely φ, as in `update_belief`.
 
     Args:
-        noise_std: of the reading, quantisation included, rad.
+        noise_std: noise of the reading, quantisation included, rad.
     """
     if not runs:
         return prior

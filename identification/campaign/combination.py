@@ -33,9 +33,9 @@ from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
-_RUN_UNKNOWNS = 5  # of a run's own fit: decay, stiffness, initial state, zero
+_RUN_UNKNOWNS = 5  # unknowns of a single-run fit: decay, stiffness, initial state, zero
 Combination = Callable[[Design, list[int], Array, Array], tuple[Array, Array]]
-"""The design, the places of its runs, φ and its covariance to φ and its covariance."""
+"""Function from the design, the places of its runs, φ and its covariance to φ and its covariance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,7 @@ class RunDecay:
 
     Args:
         gained: decay rate, stiffness and gain of its input; None where they were not found.
-        instead: why another method gave the result, and a remedy; None where it is the method's own.
+        instead: why another method gave the result, and a remedy; None for a result of the method itself.
     """
 
     estimate: RunEstimate
@@ -57,13 +57,13 @@ def combined_estimate(
 ) -> Estimate:
     """The campaign's coefficients from runs identified one by one: generalised least squares on their (a, k, g).
 
-    Scatter between the runs is in the covariance (`identification.campaign.run_scatter`). Where they contradict
-    each other beyond it, the covariance is widened by the ratio of Birge, Phys. Rev. 40 (1932) 207–227, doi
-    10.1103/PhysRev.40.207. Runs without a result or a spring stiffness are left out.
+    The covariance includes the scatter between the runs (`identification.campaign.run_scatter`). If the runs
+    contradict each other beyond it, the covariance is widened by the ratio of Birge, Phys. Rev. 40 (1932)
+    207–227, doi 10.1103/PhysRev.40.207. Runs without a result or a spring stiffness are left out.
 
     Args:
         found: the results of all runs.
-        together: a method's own combination of the runs, which starts from the least-squares one.
+        together: the method's own combination of the runs, which starts from the least-squares one.
     """
     campaign = linked.campaign
     estimate = Estimate(campaign.name, name, tuple(item.estimate for item in found))
@@ -96,7 +96,7 @@ def combined_estimate(
 
 
 def _of_another_method(found: Sequence[RunDecay]) -> tuple[Remark, ...]:
-    """A remark for each reason for which runs have the result of another method."""
+    """A remark for each reason why runs have the result of another method."""
     runs: dict[tuple[str, str], list[str]] = {}
     for item in found:
         if item.instead is not None and item.estimate.identified:
@@ -105,7 +105,7 @@ def _of_another_method(found: Sequence[RunDecay]) -> tuple[Remark, ...]:
 
 
 def scattering_estimate(linked: LinkedRuns, name: str, fitted: Sequence[FittedRun]) -> Estimate | None:
-    """The estimate from single-run least-squares fits where scatter between runs counts, otherwise None.
+    """The estimate from single-run least-squares fits if there is significant scatter between runs, otherwise None.
 
     A joint fit assumes that all runs repeat exactly, and would mistake the scatter for a misfit of the model.
     The sensor's zero is the mean of the runs' zeros, weighted by their variances.
@@ -164,7 +164,7 @@ class RunByRun(ABC):
         return combined_estimate(linked, self.name, found, together=self._together(found))
 
     def _refusal(self, run: Run) -> str:
-        """Why the method does not take a run, after "the run"; empty where it does."""
+        """Why the method does not accept a run, as words after "the run"; empty if it does."""
         del run
         return ""
 
@@ -187,12 +187,12 @@ def run_estimate(
     sensor: SensorProperties,
     windows: tuple[WindowEstimate, ...] = (),
 ) -> Found:
-    """The result of a method that does not judge the model: the least-squares residual is tested instead.
+    """The result of a method that does not judge the model itself: the least-squares residual is tested instead.
 
     Args:
-        covariance: of (a, k) from the method, shape (2, 2), in 1/s and 1/s²; None where it gives none.
-        noise_std: of one sample of the reading, rad.
-        check: of the least-squares residual; None where there is none.
+        covariance: covariance of (a, k) from the method, shape (2, 2), in 1/s and 1/s²; None if it gives none.
+        noise_std: noise of one sample of the reading, rad.
+        check: verdict of the least-squares residual; None if there is none.
     """
     reading = Reading.from_record(run.record)
     projected = project_run(reading, decay)

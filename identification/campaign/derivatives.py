@@ -43,11 +43,11 @@ _GREATEST = 1e60
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """How the runs' decay rates and stiffnesses depend on the shared parameters φ.
+    """The dependence of the runs' decay rates and stiffnesses on the shared parameters φ.
 
     Args:
         links: one (2, p) matrix per run: (aᵢ, kᵢ) = Lᵢ φ.
-        columns: places in φ of the parameters g, n, d, m that the campaign separates.
+        columns: places in φ of the separable parameters among g, n, d, m.
         stiffness_loads: ½ρV²·A·l per run, N m, shape (r,); without A·l where the size is unknown.
         damping_loads: ½ρV·A·l² per run, N m s, shape (r,); without A·l² where the size is unknown.
     """
@@ -69,8 +69,8 @@ class Derivatives:
     """The campaign's parameters.
 
     Args:
-        names: of the determined parameters, in the order of `estimate.PARAMETERS`.
-        values: shape (p,), SI. Without the rig's size, cn_beta and cn_r stand for A·l·Cnβ and A·l²·Cnr.
+        names: names of the determined parameters, in the order of `estimate.PARAMETERS`.
+        values: values, shape (p,), SI. Without the rig's size, cn_beta and cn_r stand for A·l·Cnβ and A·l²·Cnr.
         jacobian: of the values with respect to φ, shape (p, size).
     """
 
@@ -84,7 +84,7 @@ class Derivatives:
 
 
 def loads(run: Run, rig: RigProperties) -> tuple[float, float]:
-    """The factors of Cnβ and Cnr in a run: ½ρV²·A·l [N m] and ½ρV·A·l² [N m s]; ρ, A and l as 1 where unknown.
+    """The factors of Cnβ and Cnr in a run: ½ρV²·A·l [N m] and ½ρV·A·l² [N m s]; unknown ρ, A and l count as 1.
 
     Raises:
         TunnelError: when a run does not state the air density it needs, or a stated value is too large or too small
@@ -126,8 +126,8 @@ def has_size(rig: RigProperties) -> bool:
 def build_design(runs: Sequence[Run], rig: RigProperties) -> Design:
     """Link runs of stated spring stiffness to the shared parameters φ.
 
-    A driven run whose moment is known determines g. If the runs do not separate g and n, or d and m, ``columns``
-    lacks them, and their block is fitted run by run.
+    A driven run with a known moment determines g. If the runs do not separate g and n, or d and m, ``columns``
+    lacks them, and their combination is fitted run by run.
     """
     springs = np.array([run.spring_stiffness for run in runs], dtype=np.float64)
     pairs = np.array([loads(run, rig) for run in runs])
@@ -202,7 +202,7 @@ def derivatives(design: Design, parameters: PerParameter) -> Derivatives:
 
 
 def positive_inertia(design: Design, parameters: PerParameter) -> bool:
-    """Whether the design gives Izz at all, and a positive one."""
+    """Whether the design determines Izz, and a positive one."""
     return "g" in design.columns and bool(parameters[design.columns["g"]] > 0.0)
 
 
@@ -216,13 +216,13 @@ def filled_estimate(
     statuses: set[Status],
     repeatability: RunScatter | None = None,
 ) -> Estimate:
-    """The estimate with coefficients, the air of its runs and the wind-off line.
+    """The estimate with coefficients, the aerodynamic terms of its runs and the wind-off line.
 
     Without the rig's sizes the coefficients still contain the factors A·l and A·l², and only Ka and Ca per run are
     given.
 
     Args:
-        covariance: of the values found, shape (p, p).
+        covariance: covariance of the values, shape (p, p).
         repeatability: repeatability of the runs, where the covariance includes it.
     """
     air: dict[str, dict[str, Any]] = {}  # aerodynamic stiffness and damping of every wind-on run
@@ -258,7 +258,7 @@ def filled_estimate(
 
 
 def statuses_of_runs(campaign: Campaign, estimates: Sequence[RunEstimate]) -> set[Status]:
-    """The statuses of a campaign that follow from its runs, one estimate per run, in the campaign's order.
+    """The statuses of a campaign that follow from the estimates of its runs, in the campaign's order.
 
     Only NO_RUN_IDENTIFIED if no run was identified.
     """
@@ -276,7 +276,7 @@ def statuses_of_runs(campaign: Campaign, estimates: Sequence[RunEstimate]) -> se
 
 
 def noise_statuses(levels: Sequence[NoiseLevel | None]) -> set[Status]:
-    """MODEL_DEPARTS and NOISE_DISAGREES from noise levels; None where there is no level."""
+    """MODEL_DEPARTS and NOISE_DISAGREES from noise levels; None for a missing level."""
     statuses = set()
     if any(level.departs for level in levels if level is not None):
         statuses.add(Status.MODEL_DEPARTS)
@@ -286,7 +286,7 @@ def noise_statuses(levels: Sequence[NoiseLevel | None]) -> set[Status]:
 
 
 def design_statuses(design: Design, parameters: Array) -> set[Status]:
-    """The statuses of a campaign whose conditions do not separate parameters, or contradict them.
+    """The statuses for parameters that the campaign's conditions cannot separate, and for an impossible inertia.
 
     Args:
         parameters: estimated φ, shape (p,).

@@ -1,9 +1,9 @@
 """Output error of all runs together: maximum likelihood, with inputs exact between their samples.
 
-Per unit inertia a run i has (aᵢ, kᵢ, gᵢ) = Lᵢ φ + cᵢ: with a stated spring, the gain gᵢ of its input is 1/Izz for a
-known moment, Kr/Izz for the motion of the spring's root, −1 for the rotation of the base, and a parameter common to
-the campaign for an input of unknown gain; a free decay has none. That gain, and the results for a body without a
-spring, are remarks.
+Per unit inertia a run i has (aᵢ, kᵢ, gᵢ) = Lᵢ φ + cᵢ. A free decay has no gain gᵢ. With a stated spring, the
+gain of an input is 1/Izz for a known moment, Kr/Izz for the motion of the spring's root, −1 for the rotation of
+the base, and a parameter common to the campaign for an input of unknown gain. That gain, and the results for a
+body without a spring, are remarks.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ from identification.statistics import (
 from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.record import Array
 
-_JOINT_UNKNOWNS = 2  # of each run in the joint fit: its initial angle and rate; its own zero is one more
+# unknowns of each run in the joint fit: its initial angle and rate; its own zero is one more
+_JOINT_UNKNOWNS = 2
 
 
 def joint_estimate(
@@ -41,7 +42,7 @@ def joint_estimate(
 
     Args:
         fitted: every run's own fit, which starts the joint one, in the campaign's order.
-        statuses: as they follow from the runs.
+        statuses: the statuses that follow from the runs.
     """
     campaign, runs = linked.campaign, linked.runs
     estimate = replace(estimate, remarks=linked.remarks)
@@ -66,7 +67,7 @@ def joint_estimate(
     values, covariance_of_values = linked.values(fit.parameters, covariance)
     statuses = statuses | noise_statuses([noise.level, *(item.noise for item in used)])
     zero = None
-    if not campaign.driven:  # neither is stated of driven runs
+    if not campaign.driven:  # neither is stated for driven runs
         if Status.MODEL_DEPARTS in statuses and values.names:
             covariance_of_values = widened_covariance(
                 covariance_of_values, _scatter(fit, links, values, runs, own_zeros=own_zeros)

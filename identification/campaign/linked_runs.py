@@ -1,4 +1,4 @@
-"""The runs that determine a campaign's coefficients together, with their inputs: linked, combined, and stated."""
+"""The runs that jointly determine a campaign's coefficients, with their inputs: linked, combined, and reported."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ class LinkedRuns:
     """The runs with a result and a spring, linked to the shared parameters φ.
 
     Args:
-        places: of the runs in the campaign.
+        places: places of the runs in the campaign.
         gained: decay rate, stiffness and gain of every run.
-        remarks: on runs that determine no coefficient, or only by themselves.
+        remarks: remarks on runs that determine no coefficient, or only in isolation.
     """
 
     campaign: Campaign
@@ -65,12 +65,12 @@ class LinkedRuns:
 
     @cached_property
     def design(self) -> Design:
-        """Without the gains of inputs."""
+        """The design without the gains of inputs."""
         return build_design(self.runs, self.campaign.rig)
 
     @cached_property
     def linked(self) -> Design:
-        """With the gains of inputs, the unknown one last in φ."""
+        """The design with the gains of inputs, the unknown gain last in φ."""
         return with_gains(self.design, self.runs)
 
     @cached_property
@@ -80,7 +80,7 @@ class LinkedRuns:
 
     @property
     def coefficients(self) -> list[Array]:
-        """(a, k, g) without the part of the gain that depends on no unknown, by run, shape (3,), SI."""
+        """(a, k, g) without the known part of the gain, by run, shape (3,), SI."""
         pairs = zip(self.runs, self.gained, strict=True)
         return [one.coefficients - forcing_of(run, 0).fixed for run, one in pairs]
 
@@ -90,7 +90,7 @@ class LinkedRuns:
         return [one.weight for one in self.gained]
 
     def measured(self, parameters: PerParameter) -> MeasuredRuns:
-        """The runs about common parameters."""
+        """The runs, measured relative to common parameters."""
         moves = moves_of(self.runs, self.linked, parameters)
         return MeasuredRuns(self.linked.links, self.coefficients, self.weights, moves)
 
@@ -103,7 +103,7 @@ class LinkedRuns:
         return scatter_between(self.measured(start), start, self.campaign.repeatability)
 
     def values(self, parameters: Array, covariance: Array) -> tuple[Derivatives, Array]:
-        """The coefficients of φ, and their covariance, shape (q, q)."""
+        """The coefficients for φ, and their covariance, shape (q, q)."""
         size = self.design.size
         values = derivatives(self.design, parameters[:size])
         return values, values.jacobian @ covariance[:size, :size] @ values.jacobian.T
@@ -118,12 +118,12 @@ class LinkedRuns:
         statuses: set[Status],
         repeatability: RunScatter | None = None,
     ) -> Estimate:
-        """The estimate with the coefficients, and a remark on a gain that is common to the inputs.
+        """The estimate with the coefficients, and a remark on a gain common to the inputs.
 
         Args:
             of_values: covariance of the values, shape (q, q).
-            covariance: of φ, with the gain last, shape (p, p).
-            repeatability: of the runs, where the covariance includes it.
+            covariance: covariance of φ, with the gain last, shape (p, p).
+            repeatability: repeatability of the runs, if the covariance includes it.
         """
         size = self.design.size
         if self.linked.size > size:
@@ -136,9 +136,10 @@ class LinkedRuns:
 
 
 def with_gains(design: Design, runs: Sequence[Run]) -> Design:
-    """A design whose links, of shape (3, p), give the gains of the inputs too: gᵢ, 0 in free runs.
+    """A design with links of shape (3, p), which also give the gains of the inputs: gᵢ, 0 in free runs.
 
-    The row of a gain that is a known number over the inertia is zero too. Where the gain of an input is unknown,
+    The row of a gain that is a known number over the inertia is zero too. An unknown gain of an input is the
+    last
     it is the last element of φ, per unit inertia and common to the runs: shape (3, p + 1).
     """
     place = design.columns.get("g")
@@ -157,10 +158,10 @@ def with_gains(design: Design, runs: Sequence[Run]) -> Design:
 
 
 def _gain_sought(run: Run, place: int | None) -> bool:
-    """Whether the gain of a run's input is a parameter of its own.
+    """Whether the gain of a run's input is a separate parameter.
 
     Args:
-        place: of 1/Izz among the parameters; None where the runs do not determine it.
+        place: place of 1/Izz among the parameters; None where the runs do not determine it.
     """
     if run.drive is None or run.drive.kind.by_inertia:
         return False
@@ -179,13 +180,13 @@ def _joined_runs(runs: Sequence[Run], rig: RigProperties) -> set[str]:
 
 
 def _is_remarked(run: Run, joined: set[str]) -> bool:
-    """Whether a note describes a driven run alone: without a spring, or where it gives no coefficient."""
+    """Whether a note describes a driven run alone: one without a spring, or without a coefficient."""
     apart = run.id not in joined and run.known_gain is None
     return run.drive is not None and (run.unrestrained or (apart and run.drive.on_body))
 
 
 def _run_remark(run: Run, gained: Gained) -> Remark:
-    """The parameters that a driven run determines by itself, per unit inertia, and those it does not."""
+    """The parameters that a driven run determines by itself, per unit inertia, and the parameters it does not."""
     assert run.drive is not None
     (rate, _, gain), (rate_std, _, gain_std) = gained.coefficients, gained.deviations
     gain *= run.drive.kind.scale  # for a base, the moment is opposite to the acceleration
@@ -209,7 +210,7 @@ def _run_remark(run: Run, gained: Gained) -> Remark:
 
 
 def _gain_remark(runs: Sequence[Run], parameters: Array, covariance: Array, inertia: float | None) -> Remark:
-    """The gain that is common to the inputs of unknown gain.
+    """The gain common to the inputs of unknown gain.
 
     Args:
         parameters: φ with the gain last, per unit inertia, shape (p + 1,).

@@ -40,9 +40,9 @@ class PairedRun:
 
     Args:
         frequency: damped, Hz.
-        frequency_std: its standard deviation, Hz.
+        frequency_std: standard deviation of the frequency, Hz.
         rate: decay rate σ = ζωn, 1/s.
-        rate_std: its standard deviation, 1/s.
+        rate_std: standard deviation of the rate, 1/s.
     """
 
     run: Run
@@ -134,33 +134,33 @@ def _moved(outcome: Callable[[Array, Array], Array], centre: Array, scatter: Sca
 def _filled(
     estimate: Estimate,
     pairing: _Pairing,
-    seen: Sequence[PairedRun],
+    paired: Sequence[PairedRun],
     campaign: Campaign,
     scatter: ScatterFit | None,
 ) -> Estimate:
-    """The estimate, with its wind-off line, with the coefficients and the air of its runs.
+    """The estimate with its wind-off line, the coefficients and the aerodynamic terms of its runs.
 
     The deviations of f and σ are propagated one input at a time (Kragten, Analyst 119 (1994) 2161–2165, doi
-    10.1039/AN9941902161), and so are the runs' deviations where scatter between runs counts. Where it does not,
-    the scatter over the wind-on runs or of the springs is used if it is larger.
+    10.1039/AN9941902161). The runs' own deviations are propagated too if scatter between runs counts. If it
+    does not, the scatter over the wind-on runs or of the springs is used where it is larger.
     """
     rig = campaign.rig
     inertia, count = estimate.wind_off_inertia, len(pairing.on)
     assert inertia is not None
-    frequency = np.array([one.frequency for one in seen])
-    rate = np.array([one.rate for one in seen])
+    frequency = np.array([run.frequency for run in paired])
+    rate = np.array([run.rate for run in paired])
     outcome = partial(pairing.outcome, with_line=estimate.wind_off_intercept is not None)
     centre = outcome(frequency, rate)
     moved = []
-    for one, unit in zip(seen, np.eye(len(seen)), strict=True):
-        moved.append(outcome(frequency + unit * one.frequency_std, rate) - centre)
-        moved.append(outcome(frequency, rate + unit * one.rate_std) - centre)
+    for run, unit in zip(paired, np.eye(len(paired)), strict=True):
+        moved.append(outcome(frequency + unit * run.frequency_std, rate) - centre)
+        moved.append(outcome(frequency, rate + unit * run.rate_std) - centre)
     moves = np.array(moved).T
     rows: dict[str, Array] = {
         "yaw_inertia": np.eye(centre.size)[0],
         "mechanical_damping": np.eye(centre.size)[1],
     }
-    damping = 2.0 * float(centre[0]) * np.array([seen[i].rate for i in pairing.off])
+    damping = 2.0 * float(centre[0]) * np.array([paired[i].rate for i in pairing.off])
     spread = {"yaw_inertia": inertia.std, "mechanical_damping": _mean_std(damping)}
     if count and has_size(rig):
         for name, offset, column in (("cn_beta", 2, 0), ("cn_r", 2 + count, 1)):
@@ -179,7 +179,7 @@ def _filled(
         between = _moved(outcome, centre, scatter)
         own = np.sqrt(np.diag(scatter.counted(propagated, between)[0]))
         noise = jacobian @ propagated @ jacobian.T
-        covariance, added = scatter.counted(noise, [jacobian @ one for one in between])
+        covariance, added = scatter.counted(noise, [jacobian @ part for part in between])
         repeatability = scatter.described(added)
     stds = np.sqrt(np.diag(covariance))
     quantities: dict[str, Any] = {
@@ -188,7 +188,7 @@ def _filled(
     }
     values, stds = centre.tolist(), own.tolist()
     air: dict[str, dict[str, Any]] = {
-        seen[i].run.id: {
+        paired[i].run.id: {
             "aerodynamic_stiffness": Quantity(values[2 + k], stds[2 + k], "N m/rad"),
             "aerodynamic_damping": Quantity(values[2 + count + k], stds[2 + count + k], "N m s/rad"),
         }
@@ -218,33 +218,35 @@ class Paired(ABC):
             TunnelError: a wind-on run states no air density; raised before any run is analysed.
         """
         pairs = [loads(run, campaign.rig) for run in campaign.runs]
-        found = [self._run(run, campaign.sensor) for run in counted(campaign.runs)]
-        estimate = Estimate(campaign.name, self.name, tuple(one for one, _ in found))
-        known = [(one, load) for (_, one), load in zip(found, pairs, strict=True) if one is not None]
+        outcomes = [self._run(run, campaign.sensor) for run in counted(campaign.runs)]
+        estimate = Estimate(campaign.name, self.name, tuple(identified for identified, _ in outcomes))
+        known = [
+            (paired, load) for (_, paired), load in zip(outcomes, pairs, strict=True) if paired is not None
+        ]
         if not known:
             return replace(estimate, statuses=(Status.NO_RUN_IDENTIFIED,))
         of_runs = {status for run in estimate.runs for status in run.statuses}
         statuses = of_runs & {Status.MODEL_DEPARTS, Status.NOISE_DISAGREES}
-        if len(known) < len(found):
+        if len(known) < len(outcomes):
             statuses.add(Status.RUN_LEFT_OUT)
         if any(run.spring_stiffness is None for run in campaign.runs):
             statuses.add(Status.NO_STIFFNESS)
-        sprung = [(one, load) for one, load in known if one.run.spring_stiffness is not None]
+        sprung = [(paired, load) for paired, load in known if paired.run.spring_stiffness is not None]
         if not sprung:
             return replace(estimate, statuses=by_severity(statuses))
         pairing = _Pairing.of(sprung)
-        windy = sum(one.run.wind_on for one, _ in sprung)
+        windy = sum(paired.run.wind_on for paired, _ in sprung)
         if windy == 0:
             statuses.add(Status.NO_WIND_ON)
         if len(pairing.on) < windy:
             statuses.add(Status.NO_WIND_OFF_PAIR)
         if windy and not has_size(campaign.rig):
             statuses.add(Status.NO_REFERENCE_SIZE)
-        seen = [one for one, _ in sprung]
-        scatter = None  # computed as for every method
-        if pairing.off and all(one.gained is not None for one in seen):
+        paired_runs = [paired for paired, _ in sprung]
+        scatter = None  # computed in the same way for every method
+        if pairing.off and all(paired.gained is not None for paired in paired_runs):
             scatter = LinkedRuns.of(
-                campaign, [None if one is None else one.gained for _, one in found]
+                campaign, [None if paired is None else paired.gained for _, paired in outcomes]
             ).scatter
         between = None if scatter is None else scatter.described()
         line = wind_off(estimate.runs, campaign.runs, between)
@@ -253,7 +255,7 @@ class Paired(ABC):
         estimate = replace(estimate, statuses=by_severity(statuses))
         if not pairing.off or line["wind_off_inertia"] is None:
             return estimate
-        return _filled(replace(estimate, **line), pairing, seen, campaign, scatter)
+        return _filled(replace(estimate, **line), pairing, paired_runs, campaign, scatter)
 
     @abstractmethod
     def _run(self, run: Run, sensor: SensorProperties) -> tuple[RunEstimate, PairedRun | None]:

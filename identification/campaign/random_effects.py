@@ -19,8 +19,8 @@ from identification.policy import REPEATING
 from tunnel_sim.vocabulary.between_runs import USUAL_SCATTER
 from tunnel_sim.vocabulary.record import Array
 
-_ABSORBED = 1e-13  # share of a column's power, below which deviations of the runs absorb all of it
-_RIDGE = 1e-11  # of the scaled normal matrix: undetermined parameters do not influence the widths
+_ABSORBED = 1e-13  # share of a column's power below which deviations of the runs absorb all of it
+_RIDGE = 1e-11  # ridge on the scaled normal matrix: undetermined parameters do not influence the widths
 _NULL = 1e-11  # eigenvalue of the scaled normal matrix, relative to the largest, that counts as zero
 
 
@@ -70,10 +70,10 @@ class Marginal:
 
     Args:
         log_determinant: Σ ln|I + S Dᵀ D S|, dimensionless: the cost of free deviations.
-        quadratic: χ² with the likeliest deviations, plus their squares over their variances; dimensionless.
-        common: the likeliest δ, shape (common,).
+        quadratic: χ² with the most likely deviations, plus their squares over their variances; dimensionless.
+        common: the most likely δ, shape (common,).
         covariance: its covariance, shape (common, common).
-        deviations: the likeliest of every run, shape (runs, k).
+        deviations: the most likely deviations of every run, shape (runs, k).
         log_information: ln|H| of the normal matrix H of the common parameters, for the restricted likelihood;
             dimensionless.
         slope: derivative of `restricted` with respect to ln(widths), shape (k,).
@@ -89,17 +89,17 @@ class Marginal:
 
     @property
     def likelihood(self) -> float:
-        """−2 ln L at the likeliest common parameters, up to a constant: compares sets of common parameters."""
+        """−2 ln L at the most likely common parameters, up to a constant: compares sets of common parameters."""
         return self.log_determinant + self.quadratic
 
     def log_information_given(self, given: NDArray[np.bool_]) -> float:
-        """ln|H| of the other common parameters, where some are given.
+        """ln|H| of the remaining common parameters when some are given.
 
-        Where the given ones are not determined apart, a floor keeps the value finite; it is the same for all
-        widths.
+        If the given parameters are not determined separately, a floor keeps the value finite; it is the same
+        for all widths.
 
         Args:
-            given: the given parameters, shape (common,); each has a variance above 0.
+            given: the given parameters, shape (common,); each must have a variance above 0.
         """
         covariance = self.covariance[np.ix_(given, given)]
         size = np.sqrt(np.diag(covariance))
@@ -115,7 +115,7 @@ class Marginal:
 
 
 def marginal(runs: RunProducts, widths: Array) -> Marginal:
-    """Integrate the runs' deviations out.
+    """Integrate out the runs' deviations.
 
     Args:
         widths: standard deviations of the deviations, shape (k,), all above 0.
@@ -196,9 +196,9 @@ def likeliest_widths(runs: RunProducts, prior: WidthPrior, start: Array | None =
     """The widths of greatest restricted likelihood times prior, shape (k,); stated widths are unchanged.
 
     Args:
-        start: where the search starts, shape (k,); None: at the usual widths.
+        start: start of the search, shape (k,); None: the usual widths.
     """
-    from scipy.optimize import minimize  # only here: slow to load
+    from scipy.optimize import minimize  # imported here because it is slow to load
 
     free = np.flatnonzero(prior.free)
     widths = np.clip(prior.usual if start is None else start, prior.least, prior.most)
@@ -253,17 +253,17 @@ class UsualWidths:
         return WidthPrior(middle, np.where(free, self.decades, 0.0), least, self.most * usual)
 
 
-_GRID = 15  # widths in each direction
-_REACH = (40.0, 8.0)  # how far below and above the likeliest width the grid reaches, as ratios
+_GRID = 15  # number of widths in each direction
+_REACH = (40.0, 8.0)  # reach of the grid below and above the most likely width, as ratios
 _AT_ONCE = 1500  # points of the grid
-_NEGLIGIBLE = 1e-4  # density relative to the greatest; the second grid covers only greater ones
+_NEGLIGIBLE = 1e-4  # density relative to the greatest; the second grid covers only larger densities
 
 
 def width_quantiles(runs: RunProducts, prior: WidthPrior, levels: Sequence[float]) -> Array:
-    """Quantiles of every width given the runs, the others integrated out.
+    """Quantiles of every width given the runs, with the other widths integrated out.
 
     Args:
-        levels: of the quantiles, fractions.
+        levels: levels of the quantiles, fractions.
 
     Returns:
         Widths, shape (levels, k); a stated width is the same at every level.
@@ -275,7 +275,7 @@ def width_quantiles(runs: RunProducts, prior: WidthPrior, levels: Sequence[float
     ]
     axes = _axes(limits)
     density = _density(runs, prior, axes)
-    for k, axis in enumerate(axes):  # a second grid over the density of the first
+    for k, axis in enumerate(axes):  # a second grid over the region of density of the first
         inside = np.flatnonzero(_along(density, k) > _NEGLIGIBLE * _along(density, k).max())
         limits[k] = float(axis[max(inside[0] - 1, 0)]), float(axis[min(inside[-1] + 1, axis.size - 1)])
     axes = _axes(limits)
@@ -295,7 +295,7 @@ def _axes(limits: Sequence[tuple[float, float]]) -> list[Array]:
 
 
 def _density(runs: RunProducts, prior: WidthPrior, axes: Sequence[Array]) -> Array:
-    """Density of the logarithms of the widths over a grid, 1 at its greatest, of the axes' shape."""
+    """Density of the logarithms of the widths over a grid, scaled to a maximum of 1, of the axes' shape."""
     points = np.stack([one.ravel() for one in np.meshgrid(*axes, indexing="ij")], axis=1)
     parts = [points[i : i + _AT_ONCE] for i in range(0, len(points), _AT_ONCE)]
     cost = np.concatenate([_restricted(runs, part) for part in parts])
@@ -304,12 +304,12 @@ def _density(runs: RunProducts, prior: WidthPrior, axes: Sequence[Array]) -> Arr
 
 
 def _along(density: Array, place: int) -> Array:
-    """The density along one axis, the others integrated out."""
+    """The density along one axis, with the other widths integrated out."""
     return np.asarray(density.sum(axis=tuple(j for j in range(density.ndim) if j != place)), np.float64)
 
 
 def _restricted(runs: RunProducts, widths: Array) -> Array:
-    """−2 ln L of many widths, as `Marginal.restricted`, shape (points,); widths of shape (points, k)."""
+    """−2 ln L of many widths, as `Marginal.restricted`, shape (points,); the widths have the shape (points, k)."""
     scale = widths[:, None, :, None] * widths[:, None, None, :]
     inverse = np.linalg.inv(np.eye(widths.shape[1]) + scale * runs.own)
     weight = scale * inverse

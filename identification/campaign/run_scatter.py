@@ -6,9 +6,9 @@ With Ka ~ V² and Ca ~ V they change its decay rate a and its stiffness k, per u
     δk = Kr g e_K − 2 Ka g e_V,    2 δa = Cr g e_C + Ca g e_V.
 
 The deviations are integrated out (`identification.campaign.random_effects`). Stated widths are used unchanged.
-Otherwise the widths maximise restricted likelihood times prior, and they count only where a likelihood ratio
-shows scatter beyond the runs' noise. Zero is at the end of their range, so the ratio is at most a mixture of
-two χ² (Self and Liang, J. Am. Stat. Assoc. 82 (1987) 605, doi 10.1080/01621459.1987.10478472).
+Otherwise the widths maximise restricted likelihood times prior, and they count only if a likelihood ratio shows
+scatter beyond the runs' noise. Zero is at the end of their range, so the ratio is at most a mixture of two χ²
+(Self and Liang, J. Am. Stat. Assoc. 82 (1987) 605, doi 10.1080/01621459.1987.10478472).
 
 Variances with estimated widths have the degrees of freedom of Satterthwaite, Biometrics Bull. 2 (1946) 110–114, doi
 10.2307/3002019; Student's t widens them accordingly.
@@ -40,15 +40,15 @@ from tunnel_sim.vocabulary.campaign import Repeatability, Run
 from tunnel_sim.vocabulary.quantities import PerParameter
 from tunnel_sim.vocabulary.record import Array
 
-_STEP = 0.02  # of ln(width), for the finite differences of the curvature
-_ZERO = 1e-9  # width, relative to the usual one, that counts as none
+_STEP = 0.02  # step of ln(width), for the finite differences of the curvature
+_ZERO = 1e-9  # width, relative to the usual one, that counts as zero
 
 
 def moves_of(runs: Sequence[Run], design: Design, parameters: PerParameter) -> list[Array]:
     """Derivative of every run's values to the relative size of each of `SCATTERED`, shape (m, 3).
 
     Args:
-        design: of the runs, with the gains of inputs.
+        design: design of the runs, with the gains of inputs.
     """
     columns = {name: float(parameters[place]) for name, place in design.columns.items()}
     stiff, aero = columns.get("g", 0.0), columns.get("n", 0.0)
@@ -70,12 +70,12 @@ def moves_of(runs: Sequence[Run], design: Design, parameters: PerParameter) -> l
 
 @dataclass(frozen=True, eq=False)
 class MeasuredRuns:
-    """Decay rates and stiffnesses of runs from a method, and their change with deviations of the runs.
+    """Decay rates and stiffnesses of runs from a method, and how they change with deviations of the runs.
 
     Args:
         links: by run, shape (m, p), from the common parameters φ to (a, k, g).
         values: (a, k, g) by run, shape (m,).
-        weights: inverse covariance of its noise by run, shape (m, m).
+        weights: inverse covariance of the noise of the values by run, shape (m, m).
         moves: by run, derivative to the relative size of each of `SCATTERED`, shape (m, 3).
     """
 
@@ -90,7 +90,7 @@ class MeasuredRuns:
         return sum(float(one @ weight @ one) for one, weight in zip(away, self.weights, strict=True))
 
     def floored(self, least: Array) -> MeasuredRuns:
-        """The runs with at least the noise of the least widths, so that rounding does not hide it beside a width.
+        """The runs with at least the noise of the least widths, so that rounding does not hide the noise.
 
         Args:
             least: relative, of each of `SCATTERED`, shape (3,).
@@ -106,7 +106,7 @@ class MeasuredRuns:
         return replace(self, weights=weights)
 
     def about(self, start: PerParameter, used: Array) -> RunProducts:
-        """The products of their columns, for corrections of φ and deviations.
+        """The products of the runs' columns, for corrections of φ and deviations.
 
         Args:
             used: places of the deviations in `SCATTERED`, shape (k,).
@@ -132,10 +132,10 @@ class ScatterFit:
         widths: relative standard deviations, shape (k,).
         uncertain: covariance of ln(widths), shape (k, k); zero for a stated width.
         stated: names of the widths that the campaign states.
-        noise: covariance of φ by the noise of the runs alone, shape (p, p).
-        quadratic: χ² with the likeliest deviations, dimensionless.
-        gains: by run, how φ depends on its values, shape (p, m).
-        moves: by run, of one standard deviation of each, shape (m, k).
+        noise: covariance of φ due to the noise of the runs alone, shape (p, p).
+        quadratic: χ² with the most likely deviations, dimensionless.
+        gains: derivative of φ by a run's values, by run, shape (p, m).
+        moves: change by one standard deviation of each kind of scatter, by run, shape (m, k).
         values: by run, shape (m,).
     """
 
@@ -215,7 +215,7 @@ class ScatterFit:
             ends = width * float(np.exp(-reach * deviation)), width * float(np.exp(reach * deviation))
             std = 0.0 if name in self.stated else width * deviation
             widths[name] = Quantity(width, std, "1", None if name in self.stated else ends)
-        spread = np.array([np.sum(move[:2] ** 2, axis=1) for move in self.moves])  # of (a, k)
+        spread = np.array([np.sum(move[:2] ** 2, axis=1) for move in self.moves])  # places of (a, k)
         sizes = np.array([seen[:2] for seen in self.values]) ** 2
         shares = np.divide(spread, sizes, out=np.zeros_like(spread), where=sizes > 0.0)
         relative = np.sqrt(shares.sum(axis=0) / np.maximum((sizes > 0.0).sum(axis=0), 1))
@@ -233,11 +233,11 @@ def scatter_between(
     start: Array,
     repeatability: Repeatability | None,
 ) -> ScatterFit | None:
-    """The scatter between runs; None where none is stated and the runs show none beyond their noise.
+    """The scatter between runs; None if none is stated and the runs show none beyond their noise.
 
     Args:
         start: φ of generalised least squares without scatter, shape (p,).
-        repeatability: as the campaign states it; used unchanged.
+        repeatability: as stated by the campaign; used unchanged.
     """
     stated = {} if repeatability is None else repeatability.stated
     usual = UsualWidths()
@@ -250,30 +250,32 @@ def scatter_between(
     names = [SCATTERED[place] for place in shown]
     prior = usual.prior(names, stated)
     runs = measured.about(start, np.array(shown))
-    kept = np.arange(len(names))
+    scattering = np.arange(len(names))
     widths = prior.usual
     if prior.free.any():
         widths = likeliest_widths(runs, prior)
         none = np.where(prior.free, _ZERO * prior.usual, prior.usual)
         gained = marginal(runs, none).restricted - marginal(runs, widths).restricted
         if gained < ratio_limit(int(prior.free.sum())):
-            kept = np.flatnonzero(~prior.free)
-    if not kept.size:
+            scattering = np.flatnonzero(~prior.free)
+    if not scattering.size:
         return None
-    used = np.array(shown)[kept]
-    runs, widths = measured.about(start, used), widths[kept]
-    prior = WidthPrior(prior.usual[kept], prior.decades[kept], prior.least[kept], prior.most[kept])
-    found = marginal(runs, widths)
+    used = np.array(shown)[scattering]
+    runs, widths = measured.about(start, used), widths[scattering]
+    prior = WidthPrior(
+        prior.usual[scattering], prior.decades[scattering], prior.least[scattering], prior.most[scattering]
+    )
+    fitted = marginal(runs, widths)
     moves = [move[:, used] * widths for move in measured.moves]
-    gains, noise = _gains(measured, moves, found)
+    gains, noise = _gains(measured, moves, fitted)
     return ScatterFit(
-        tuple(names[place] for place in kept),
+        tuple(names[place] for place in scattering),
         widths,
         _uncertainty(runs, widths, prior),
-        tuple(names[place] for place in kept if names[place] in stated),
-        start + found.common,
+        tuple(names[place] for place in scattering if names[place] in stated),
+        start + fitted.common,
         noise,
-        found.quadratic,
+        fitted.quadratic,
         gains,
         moves,
         measured.values,
@@ -284,8 +286,8 @@ def ratio_limit(free: int, rate: float = policy.DIFFERENCE_RATE) -> float:
     """The likelihood ratio, −2 ln, beyond which widths count.
 
     Args:
-        free: number of widths that are estimated, 1 or more.
-        rate: greatest probability of exceeding it where no run scatters.
+        free: number of estimated widths, 1 or more.
+        rate: maximum probability of exceeding the limit where no run scatters.
     """
     low, high = 0.0, float(chdtri(free, rate))
     while high - low > 1e-6:  # the mixture lies between χ² of free − 1 and of free degrees of freedom
@@ -297,7 +299,7 @@ def ratio_limit(free: int, rate: float = policy.DIFFERENCE_RATE) -> float:
 
 
 def _gains(measured: MeasuredRuns, moves: Sequence[Array], found: Marginal) -> tuple[list[Array], Array]:
-    """The gain from every run's values to φ, and the covariance of φ from their noise.
+    """The derivative of φ by every run's values, and the covariance of φ from their noise.
 
     The first is H⁻¹ Jᵀ V⁻¹ with V = W⁻¹ + D S² Dᵀ.
     """

@@ -27,7 +27,7 @@ from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
-_TRIALS = 9999  # simulated sets of correct springs that calibrate the rule
+_TRIALS = 9999  # number of simulated sets of correct springs that calibrate the rule
 
 
 @dataclass(frozen=True)
@@ -35,10 +35,10 @@ class SpringFit:
     """The line Kr = Izz ωn² + intercept.
 
     Args:
-        inertia: its gradient Izz, kg m².
+        inertia: Izz, the gradient of the line, kg m².
         intercept: N m/rad.
-        residual_percent: stated stiffness over the line's, less one, per spring, %.
-        p_value: probability that correct springs deviate at least as much as this set.
+        residual_percent: stated stiffness over the line's value, minus one, by spring, %.
+        p_value: probability that correct springs deviate at least as much as these.
     """
 
     inertia: Quantity
@@ -66,8 +66,8 @@ def fit_springs(
 
     Args:
         stiffness: Kr per spring, N m/rad, shape (n,), n ≥ 3.
-        frequency_hz: wind-off frequency with it, Hz, shape (n,).
-        rng: draws the calibration; None: a fixed seed, so that the result is repeatable.
+        frequency_hz: wind-off frequency with each spring, Hz, shape (n,).
+        rng: generator for the calibration; None: a fixed seed, so that the result is repeatable.
 
     Raises:
         TunnelError: with fewer than three springs, unequal lengths or values that are not positive.
@@ -110,12 +110,12 @@ def fit_springs(
 
 
 def pair_remark(campaign: Campaign, runs: Sequence[RunEstimate]) -> Remark | None:
-    """A remark that the two springs of a campaign give different inertias; None if they agree or are not two.
+    """A remark that the two springs of a campaign give different inertias; None if they agree, or are not two.
 
     Two springs known to `SPRING_AT_BEST` disagree at the level `DIFFERENCE_RATE`.
 
     Args:
-        campaign: states the stiffnesses.
+        campaign: the campaign, which states the stiffnesses.
         runs: the estimates; the natural frequencies of free decays with the wind off are compared.
     """
     still = [run for run in campaign.decays if not run.wind_on]
@@ -155,15 +155,15 @@ def wind_off_line(
     """Izz [kg m²] from wind-off runs, the gradient of Kr against ωn², and the intercept [N m/rad].
 
     The standard deviation is the larger of two: from the scatter about the line, and propagated from the
-    frequencies' standard deviations. Springs whose stated stiffnesses are within 1 %, or whose frequencies cannot
-    be distinguished, count as one, and Izz is Kr/ωn²: a gradient over them would be dominated by their errors and
-    too small (the attenuation of Fuller, Measurement Error Models (1987), doi 10.1002/9780470316665, § 1.1). The
-    intercept is then None; both are None where the frequencies fall as the springs get stiffer.
+    frequencies' standard deviations. Springs with stated stiffnesses within 1 %, or with indistinguishable
+    frequencies, count as one, and Izz is then Kr/ωn²: a gradient over them would be dominated by their errors
+    and too small (the attenuation of Fuller, Measurement Error Models (1987), doi 10.1002/9780470316665, §
+    1.1). The intercept is then None; both are None if the frequencies fall as the springs get stiffer.
 
     Args:
         stiffness: Kr per run, N m/rad, shape (n,).
         omega_n: natural angular frequency per run, rad/s, shape (n,).
-        omega_n_std: its standard deviation, rad/s, shape (n,).
+        omega_n_std: standard deviation of ωn, rad/s, shape (n,).
     """
     squared, squared_std = omega_n**2, 2.0 * omega_n * omega_n_std
     away = stiffness - stiffness.mean()
@@ -217,7 +217,7 @@ def _take_out_the_worst(sets: Array) -> tuple[Array, NDArray[np.intp]]:
         mean = np.sum(sets * kept, axis=1, keepdims=True) / count
         squares = np.where(kept, (sets - mean) ** 2, -1.0)
         worst = np.argmax(squares, axis=1)
-        own = squares[rows, worst] * count / (count - 1)  # over 1 − leverage
+        own = squares[rows, worst] * count / (count - 1)  # divided by 1 − leverage
         # Rounding errors do not count: a set of equal springs has no outlier.
         floor = (1e-12 * np.abs(mean[:, 0])) ** 2
         rest = np.maximum((np.sum(squares * kept, axis=1) - own) / (count - 2), floor)

@@ -1,8 +1,9 @@
 """The estimators, one per file, and their registry, with estimators of installed packages and registered ones.
 
-To add one, write a frozen dataclass with the members of `Estimator`, whose fields are its settings, and add a
-line to `SUMMARIES`. The file has the estimator's name, and the class has that name in CamelCase, as in
-``output_error.OutputError``. It is imported when the estimator is made, so heavy imports are deferred until then.
+To add one, write a frozen dataclass with the members of `Estimator`; its fields are the settings. Add a line to
+`SUMMARIES`. The file has the estimator's name, and the class has that name in CamelCase, as in
+``output_error.OutputError``. It is imported when the estimator is made, so heavy imports are deferred until
+then.
 """
 
 from __future__ import annotations
@@ -26,8 +27,8 @@ if TYPE_CHECKING:
 class Estimator(Protocol):
     """An identification method with its settings.
 
-    A class that also states ``takes_driven = True`` gets the driven runs of a campaign, with their inputs; without
-    it a campaign with driven runs is refused.
+    A class that also states ``takes_driven = True`` gets the driven runs of a campaign, with their inputs;
+    other classes refuse a campaign with driven runs.
     """
 
     name: ClassVar[str]
@@ -64,7 +65,7 @@ DRIVEN_ONLY: tuple[str, ...] = ("frequency_response",)
 """Estimators that do not take free decays."""
 
 ALL_ESTIMATORS: tuple[str, ...] = tuple(name for name in SUMMARIES if name not in DRIVEN_ONLY)
-"""The packaged ones that take free decays."""
+"""The packaged estimators that take free decays."""
 
 
 ENTRY_POINTS = "tunnel.estimators"
@@ -112,7 +113,7 @@ def register_from(word: str) -> str:
     """Register the class named by a word ``module:Class``, and return the name of the estimator.
 
     Args:
-        word: the module is imported as Python does: from the folders of ``sys.path``.
+        word: the module and the class; Python imports the module from the folders of ``sys.path``.
 
     Raises:
         TunnelError: when the module or class cannot be loaded, or is not an estimator.
@@ -143,8 +144,8 @@ def make_estimator(name: str) -> Estimator:
         name: one of `known_estimators`.
 
     Raises:
-        TunnelError: when there is no such estimator, naming the closest one; or when the entry of an installed
-            package is not an estimator of that name.
+        TunnelError: when there is no such estimator, naming the closest one; or when an installed package's
+            entry of that name is not an estimator.
     """
     if name in _registered:
         return cast("Estimator", _registered[name]())
@@ -185,7 +186,7 @@ def estimators_of_driven_runs() -> tuple[str, ...]:
 
 
 def summary_of(name: str) -> str:
-    """One line on an estimator: from `SUMMARIES`, or the first line of your own estimator's docstring."""
+    """One line on an estimator: from `SUMMARIES`, or the first line of a user's docstring."""
     if name in SUMMARIES:
         return SUMMARIES[name]
     with suppress(TunnelError):
@@ -201,7 +202,7 @@ class Own:
     Args:
         place: ``module:Class`` of a registered class that other processes can import; empty for a class of an
             installed package, and for a class from a prompt, a notebook or the inside of a function.
-        code: the first digits of the SHA-256 of the file of its module; empty where it has none.
+        code: the first digits of the SHA-256 of the file of its module; empty without a file.
     """
 
     name: str

@@ -9,8 +9,8 @@ have the stated coverage and do not depend on the choice of parameters (Proc. R.
     p(a, k | y) ∝ RSS(a, k)^(−ν/2) √|I(a, k)|,   or  exp(−RSS/2S²) √|I|  where the noise S is known,
 
 with RSS the sum of squares at the best state and zero, and I the information on (a, k) there. Both are summed
-over a grid. So the logarithm of the likelihood need not be a parabola, as it is not in records of one to three
-cycles. The gain of the input of a driven run is one more linear unknown.
+over a grid. The logarithm of the likelihood therefore need not be a parabola, which it is not in records of one
+to three cycles. The gain of the input of a driven run is one more linear unknown.
 """
 
 from __future__ import annotations
@@ -38,15 +38,16 @@ from tunnel_sim.vocabulary.record import Array
 # Half width and step in standard deviations: for a normal distribution the sum is exact to 1e-7.
 _FIRST = (5.6, 0.8)
 _FINER = (7.0, 0.35)
-_WIDENING = 1.25  # of the half width in each refinement after the first: Student's tails are long
+_WIDENING = 1.25  # factor on the half width in each refinement after the first: Student's tails are long
 _MOST_REFINEMENTS = 7
 _BORDER_MASS = 1e-4
-_SCALE_BAND = (0.7, 1.4)  # of the estimated standard deviations over those assumed for the grid
-_FLOOR = -60.0  # of the logarithm of the likelihood relative to its peak: smaller values are neglected
+_SCALE_BAND = (0.7, 1.4)  # ratio of the estimated standard deviations to those assumed for the grid
+_FLOOR = -60.0  # logarithm of the likelihood relative to its peak: smaller values are neglected
 _STEEPEST = 50.0  # |a| times the record's length: beyond it the record would not show the motion
-_RIDGE = 1e-13  # of a scaled Gram matrix, which is singular for a motion of only a few samples
-_FINE = 121  # points a side for the quantiles
-_NODES = 5  # a side, at which the response to an input is computed: it is nearly linear over the posterior
+_RIDGE = 1e-13  # ridge on a scaled Gram matrix, which is singular for a motion of only a few samples
+_FINE = 121  # number of points on each side for the quantiles
+# number of points on each side for the response to an input: it is nearly linear over the posterior
+_NODES = 5
 TAIL = 0.025
 
 
@@ -56,7 +57,7 @@ class NoiseKnowledge:
 
     Args:
         variance: S² of one value of the reading, rad²; None where it is unknown and integrated out.
-        within: sum of squares within the blocks, rad², which thinning removes from the residual.
+        within: sum of squares within the blocks, rad², which averaging removes from the residual.
         freedom: ν, number of samples less number of linear unknowns.
     """
 
@@ -71,11 +72,11 @@ class DecayPosterior:
     """A posterior of (a, k).
 
     Args:
-        centre: of the grid, shape (2,), 1/s and 1/s².
+        centre: centre of the grid, shape (2,), 1/s and 1/s².
         scale: lower triangular: (a, k) = centre + scale z, shape (2, 2).
-        axis: of both coordinates z, shape (m,), dimensionless.
-        log_likelihood: over the grid without the prior, its largest 0, shape (m, m).
-        log_posterior: with the prior, shape (m, m).
+        axis: values of both coordinates z, shape (m,), dimensionless.
+        log_likelihood: logarithm of the likelihood over the grid, its maximum at 0, shape (m, m).
+        log_posterior: the same with the prior, shape (m, m).
     """
 
     centre: Array
@@ -121,19 +122,19 @@ class InputResponse:
     Args:
         response: to unit gain and its derivatives with respect to a and k, at the values of the reading, shape
             (3, n), as a function of the decay.
-        known: the gain over the inertia, where the motion determines it; None where it is a linear unknown.
+        known: the gain over the inertia, if the motion determines it; None if it is a linear unknown.
     """
 
     response: Callable[[Decay], Array]
     known: KnownGain | None
 
     def over(self, centre: Array, scale: Array, axis: Array) -> Array:
-        """The response at all points of a grid, shape (m², 3, n), from Chebyshev polynomials through a few of them.
+        """The response at all points of a grid, shape (m², 3, n), by Chebyshev interpolation between a few of them.
 
         Args:
-            centre: of the grid, shape (2,), 1/s and 1/s².
+            centre: centre of the grid, shape (2,), 1/s and 1/s².
             scale: as in `DecayPosterior`, shape (2, 2).
-            axis: of both coordinates, shape (m,), dimensionless.
+            axis: values of both coordinates, shape (m,), dimensionless.
         """
         nodes = chebyshev.chebpts1(_NODES)
         decays = centre[:, None] + scale @ _points(axis[-1] * nodes)
@@ -157,7 +158,7 @@ def posterior_of(
 
     Args:
         covariance: an estimate of the covariance of (a, k), shape (2, 2).
-        forced: for a driven run.
+        forced: response of a driven run to its input.
     """
     centre, spread = np.array([start.rate, start.stiffness]), covariance
     width, step = _FIRST
@@ -277,7 +278,7 @@ def _summary(values: Array, weights: Array) -> tuple[float, float, float, float]
 _PAIRS = 3000
 _TAILS = 6.0  # degrees of freedom of the proposal
 _ROUNDS = 4
-_LEAST_SHARE = 0.3  # of the draws: least effective number
+_LEAST_SHARE = 0.3  # minimum effective number of draws, as a share
 
 
 def shared_moments(
@@ -289,14 +290,14 @@ def shared_moments(
 ) -> tuple[Array, Array]:
     """Mean, shape (p,), and covariance, shape (p, p), of φ, with a flat prior on it.
 
-    They are drawn from the product of the runs' likelihoods: importance sampling from Student's distribution
-    about the normal approximation, drawn in pairs of opposite sign, and repeated where it misses the posterior
-    (Kloek & van Dijk, Econometrica 46 (1978) 1–19, doi 10.2307/1913641).
+    Draws from the product of the runs' likelihoods: importance sampling from Student's distribution about the
+    normal approximation, in pairs of opposite sign, repeated if it misses the posterior (Kloek & van Dijk,
+    Econometrica 46 (1978) 1–19, doi 10.2307/1913641).
 
     Args:
         links: one (2, p) matrix per run: (a, k) = L φ.
-        centre: of the normal approximation, shape (p,).
-        covariance: of the normal approximation, shape (p, p).
+        centre: centre of the normal approximation, shape (p,).
+        covariance: covariance of the normal approximation, shape (p, p).
     """
     size = centre.size
     half = rng.standard_normal((_PAIRS, size))
@@ -339,7 +340,7 @@ class Bayesian(RunByRun):
     """Posterior means, deviations and intervals.
 
     Args:
-        blocks_per_cycle: least number of block means per period in the posterior.
+        blocks_per_cycle: minimum number of block means per period in the posterior.
     """
 
     name = "bayesian"
@@ -349,7 +350,7 @@ class Bayesian(RunByRun):
 
     def _together(self, found: Sequence[RunDecay]) -> Combination | None:
         if any(isinstance(one, _PosteriorDecay) and one.driven for one in found):
-            return None  # only moments give their gains together with (a, k)
+            return None  # only inputs that are moments give their gains together with (a, k)
 
         def together(
             design: Design, places: list[int], centre: Array, covariance: Array

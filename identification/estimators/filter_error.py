@@ -1,10 +1,10 @@
 """Filter error: maximum likelihood with a random moment on the model and noise in the sensor.
 
-For runs in a turbulent stream, where the residual of output error is not white and its intervals are too
-narrow or, after widening, too wide. A Kalman filter predicts every sample from the previous ones, and decay rate,
+For runs in a turbulent stream, where the residual of output error is not white and its intervals are too narrow
+or, after widening, too wide. A Kalman filter predicts every sample from the previous ones. Decay rate,
 stiffness and intensity of the moment maximise the likelihood of the prediction errors
-(`identification.signal.filter`). A run without a random moment has the result of output error, which a remark
-says; for a body without a spring no random moment is sought.
+(`identification.signal.filter`). Without a random moment, a run has the result of output error, and a remark
+says so; for a body without a spring no random moment is sought.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
 _DECIDED = 6  # parameters fitted to a run's data: decay, stiffness, intensity, initial state, zero
-_INNOVATIONS_CYCLE = 24.0  # innovations in a cycle
+_INNOVATIONS_CYCLE = 24.0  # number of innovations in a cycle
 INTENSITY_UNIT = "rad2/s3"
 
 
@@ -46,7 +46,7 @@ class FilterError(RunByRun):
     ⟨w(t)w(t′)⟩ = q δ(t − t′); where its spectrum is not flat, q at the natural frequency.
 
     Args:
-        blocks_per_cycle: block means per period that the filter uses, at least.
+        blocks_per_cycle: minimum number of block means per period for the filter.
     """
 
     name = "filter_error"
@@ -91,7 +91,7 @@ class FilterError(RunByRun):
         return RunDecay(estimate, Gained.of(coefficients, of_sought, sought))
 
     def _driven(self, bare: FittedRun, sensor: SensorProperties) -> tuple[DrivenFit, float] | str:
-        # The fit, and its assumed sensor noise of one sample; or why there is none.
+        # The fit, with its assumed sensor noise of one sample; or the reason why there is none.
         fit, noise = bare.fit, bare.noise
         if fit is None or noise is None or fit.decay.omega_d == 0.0:
             return "no random moment is sought in a motion without oscillation"

@@ -27,10 +27,12 @@ from identification.signal.run_unknowns import ANGLE, ANGULAR_RATE, RunUnknowns
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
-_EXCITED = 1e-3  # of the input's greatest line, in power, from which a line counts as excited on purpose
-_BETWEEN = 1e-6  # share of the input's power between these lines, below which it is periodic in the record
-_LEAST = 1e-8  # of the input's greatest line, in power: weaker ones are rounding
-_FEWEST = 6  # lines: the real and imaginary parts of five unknowns, and some to judge the fit
+# share of the power of the input's greatest line from which a line counts as excited on purpose
+_EXCITED = 1e-3
+_BETWEEN = 1e-6  # share of the input's power between these lines below which it is periodic in the record
+_LEAST = 1e-8  # share of the power of the input's greatest line: weaker lines are rounding
+# minimum number of lines: the real and imaginary parts of five unknowns, and some to judge the fit
+_FEWEST = 6
 _STEPS = 30
 _SETTLED = 1e-10  # relative change of the coefficients or of the sum of squares
 
@@ -40,8 +42,9 @@ class FrequencyResponse(RunByRun):
     """A second-order response fitted to Ĥ1 of driven runs.
 
     Args:
-        segments: lengths of a segment in the record, where the input is not periodic; segments overlap by half.
-        least_coherence: of reading and model at a line that is used, a share of the power.
+        segments: number of segment lengths in the record, if the input is not periodic; segments overlap by
+            half.
+        least_coherence: minimum coherence of reading and model at a line, as a share of the power.
     """
 
     name = "frequency_response"
@@ -94,7 +97,7 @@ class _Lines:
         starts: first sample of every segment, shape (s,).
         used: indices of the lines, shape (k,).
         moved: conjugate spectrum of the input over its power, shape (s, k).
-        power: of the input, shape (k,).
+        power: power of the input, shape (k,).
     """
 
     window: Array

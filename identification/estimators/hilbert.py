@@ -1,10 +1,10 @@
 """Hilbert envelope: decay rate from the logarithm of the envelope, frequency from the phase.
 
-The analytic signal of a finite record is wrong near its ends. So the record is first extended past both ends by a
-few cycles of an approximate decay that fades out. The envelope is demodulated with a fixed frequency and averaged
-over half cycles: the averages of a decay are again an exponential sequence, with independent errors of √2 S/(√m A)
-in logarithm and phase alike for m samples. Where a line does not fit a run, its standard deviations are raised to
-the scatter about it.
+The analytic signal of a finite record is wrong near its ends. The record is therefore first extended past both
+ends by a few cycles of an approximate decay that fades out. The envelope is demodulated with a fixed frequency
+and averaged over half cycles. The averages of a decay are again an exponential sequence; for m samples their
+logarithms and phases have independent errors of √2 S/(√m A). Where a line does not fit a run, its standard
+deviations are raised to the scatter about it.
 
 Sources: M. Feldman, Mech. Syst. Signal Process. 25 (2011) 735–802, doi 10.1016/j.ymssp.2010.07.018 (free decay by
 the Hilbert transform, and its end effects); backbone from free decays: J. M. Londoño, S. A. Neild & J. E. Cooper,
@@ -33,7 +33,7 @@ from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.quantities import Angles
 from tunnel_sim.vocabulary.record import Array
 
-_CARRIED_ON = 6.0  # cycles past either end
+_CARRIED_ON = 6.0  # cycles beyond either end
 _GROWTH = 3.0  # a fast decay is extended backwards only until it has grown by e³
 
 
@@ -42,7 +42,7 @@ class Envelope:
     """Half-cycle averages of the demodulated analytic signal.
 
     Args:
-        time: their middles since the first sample, shape (n,), s.
+        time: middles of the half cycles since the first sample, shape (n,), s.
         phase: relative to the carrier, unwrapped, shape (n,), rad.
         carrier: the demodulating angular frequency, rad/s.
     """
@@ -58,10 +58,10 @@ def envelope(reading: Reading, rough: RunFit, zero: float) -> Envelope:
     """Envelope and phase of a record: at least one average per half cycle.
 
     Args:
-        rough: an approximate decay of the record, with its initial state; it must oscillate.
-        zero: the sensor's, rad.
+        rough: an oscillating approximate decay of the record, with its initial state.
+        zero: the sensor's zero, rad.
     """
-    from scipy.signal import hilbert  # only here: slow to load
+    from scipy.signal import hilbert  # imported here because it is slow to load
 
     reading = even_reading(reading)
     interval = float(reading.time[-1]) / (reading.time.size - 1)
@@ -84,7 +84,7 @@ def envelope(reading: Reading, rough: RunFit, zero: float) -> Envelope:
     return Envelope(middles, np.abs(means), np.unwrap(np.angle(means)), omega, block)
 
 
-_PASSES = 3  # each extends the record with the decay of the previous one
+_PASSES = 3  # each round extends the record with the decay of the previous one
 _LEAST_POINTS = 5
 
 
@@ -108,37 +108,37 @@ class Hilbert(RunByRun):
         coloured = check is not None and check.colour is not None
         # half-cycle averages are lines of zero noise at all other harmonics: only the power at the motion counts
         noise_std = check.noise_std if check is not None and coloured else reading_noise(run.record, sensor)
-        decay, covariance, seen = start, None, None
+        decay, covariance, averages = start, None, None
         for _ in range(_PASSES):
             projected = project_run(reading, decay) if decay.omega_d > 0.0 else None
             if projected is None:
                 return Status.NOT_CONVERGED
             if decay.omega_d * float(reading.time[-1]) < np.pi * _LEAST_POINTS:
                 break  # too few half cycles for a line
-            seen = envelope(reading, *projected)
-            lines = _lines(seen, decay, noise_std)
+            averages = envelope(reading, *projected)
+            lines = _lines(averages, decay, noise_std)
             if lines is None:
                 break
             decay, covariance = lines
-        if seen is None or decay.stiffness <= 0.0:
+        if averages is None or decay.stiffness <= 0.0:
             return Status.NOT_CONVERGED
         windows: list[WindowEstimate] = []  # lines through consecutive parts of the envelope
         length = 2 * self.cycles_per_window  # two averages per cycle
-        deviation = noise_std * np.sqrt(2.0 / seen.samples)
+        deviation = noise_std * np.sqrt(2.0 / averages.samples)
         shown = covariance is not None and length > 0
-        for begin in range(0, seen.time.size - length + 1, length) if shown else ():
+        for begin in range(0, averages.time.size - length + 1, length) if shown else ():
             part = slice(begin, begin + length)
-            amplitude = float(np.exp(np.log(seen.amplitude[part]).mean()))
-            if 0.5 * length * seen.samples * amplitude**2 < LEAST_WINDOW_ENERGY * noise_std**2:
+            amplitude = float(np.exp(np.log(averages.amplitude[part]).mean()))
+            if 0.5 * length * averages.samples * amplitude**2 < LEAST_WINDOW_ENERGY * noise_std**2:
                 break
-            _, own, own_covariance = _fitted(seen, part, np.full(length, deviation / amplitude))
+            _, own, own_covariance = _fitted(averages, part, np.full(length, deviation / amplitude))
             if own.stiffness <= 0.0:
                 break
-            step = float(seen.time[1] - seen.time[0])
+            step = float(averages.time[1] - averages.time[0])
             omega_n, zeta = modal_quantities(own, own_covariance)
             windows.append(
                 WindowEstimate(
-                    start_s=float(seen.time[begin] - 0.5 * step),
+                    start_s=float(averages.time[begin] - 0.5 * step),
                     duration_s=length * step,
                     amplitude=Quantity(amplitude, float(deviation / np.sqrt(length)), "rad"),
                     omega_n=omega_n,
@@ -149,20 +149,20 @@ class Hilbert(RunByRun):
         return run_estimate(run, decay, covariance, noise_std, check, sensor, tuple(windows))
 
 
-def _lines(seen: Envelope, decay: Decay, noise_std: float) -> tuple[Decay, Array] | None:
+def _lines(averages: Envelope, decay: Decay, noise_std: float) -> tuple[Decay, Array] | None:
     # The decay and the covariance of (a, k). Weights follow the line, not the noisy envelope itself.
-    deviation = noise_std * np.sqrt(2.0 / seen.samples)
-    if not seen.amplitude.min() > 0.0:
+    deviation = noise_std * np.sqrt(2.0 / averages.samples)
+    if not averages.amplitude.min() > 0.0:
         return None
-    scale = float(np.exp(np.mean(np.log(seen.amplitude[:4]) + decay.rate * seen.time[:4])))
-    expected = scale * np.exp(-decay.rate * seen.time)
+    scale = float(np.exp(np.mean(np.log(averages.amplitude[:4]) + decay.rate * averages.time[:4])))
+    expected = scale * np.exp(-decay.rate * averages.time)
     for _ in range(2):
         below = np.flatnonzero(expected < LEAST_ENVELOPE * deviation)
         count = int(below[0]) if below.size else expected.size
         if count < _LEAST_POINTS:
             return None
-        logarithm, decay, covariance = _fitted(seen, slice(0, count), deviation / expected[:count])
-        expected = np.exp(logarithm[0] - logarithm[1] * seen.time)
+        logarithm, decay, covariance = _fitted(averages, slice(0, count), deviation / expected[:count])
+        expected = np.exp(logarithm[0] - logarithm[1] * averages.time)
     return decay, covariance
 
 

@@ -28,7 +28,7 @@ from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
 _LEAST_PEAKS = 5
-_SWEEPS = 4  # of weights and zero; each adds two digits
+_SWEEPS = 4  # rounds of weights and zero; each adds two digits
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,8 @@ class MatrixPencil(RunByRun):
     """Poles from the shift of a Hankel matrix.
 
     Args:
-        blocks_per_cycle: block means per period, at least. Fewer are faster but lose signal: its amplitude
-            in them falls by (π/blocks)²/6.
+        blocks_per_cycle: minimum number of block means per period. Fewer are faster but lose signal: averaging
+            lowers its amplitude by (π/blocks)²/6.
     """
 
     name = "matrix_pencil"

@@ -1,10 +1,10 @@
 """The paper's neural networks: three cycles at a time, ζ by 100-5-5-1 and ωn by 2-2-5-1.
 
-The run's ζ and ωn are averages over its windows (the paper's Table III), weighted by their noise; eqs 10, 11, 17
-and 18 then give Cnβ and Cnr (`identification.campaign.pairing`). A standard deviation combines the noise of the
-reading, by the delta method; the posterior of the networks' weights; and their largest error on test responses.
-Where the scatter of the windows is larger, the deviation is raised to it and the status says that the model does
-not explain the data.
+The run's ζ and ωn are averages over its windows (the paper's Table III), weighted by their noise; eqs 10, 11,
+17 and 18 then give Cnβ and Cnr (`identification.campaign.pairing`). A standard deviation combines the noise of
+the reading, by the delta method; the posterior of the networks' weights; and the networks' largest error on
+test responses. If the windows scatter more, the scatter replaces it and the status says that the model does not
+explain the data.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class NeuralNetwork(Paired):
     """The paper's networks.
 
     Args:
-        weights: a safetensors file written by ``tunnel train``; the packaged weights where None.
+        weights: a safetensors file written by ``tunnel train``; None: the packaged weights.
     """
 
     name = "neural_network"
@@ -155,10 +155,10 @@ class WindowReading:
 def read_windows(
     record: Record, noise_std: float | None, networks: Networks
 ) -> tuple[list[WindowReading], float]:
-    """The windows of a record up to the first that is not similar to a damped oscillation, and the clear cycles.
+    """The windows of a record up to the first that does not resemble a damped oscillation, and the clear cycles.
 
     Args:
-        noise_std: of one sample, rad; None where nothing moves.
+        noise_std: noise of one sample, rad; None where nothing moves.
     """
     if noise_std is None:
         return [], 0.0
@@ -172,7 +172,7 @@ def read_windows(
 
 
 def read_window(window: ThreeCycles, networks: Networks) -> WindowReading | None:
-    """Put a window through both networks; None where it is not similar to a damped oscillation."""
+    """Put a window through both networks; None where it does not resemble a damped oscillation."""
     inputs = window.shape.inputs
     zeta = float(networks.zeta(inputs[None])[0])
     clean = network_inputs(np.clip([zeta], *networks.spec.zeta_range))[0]

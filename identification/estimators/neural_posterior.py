@@ -3,8 +3,8 @@
 In windows of envelope and phase, the nominal model and each of many rivals is a linear fit
 (`identification.neural.rivals`). Values are medians of the mixture with the network's weights, with its 95 %
 intervals; the standard deviation is the interval's width over 3.92. ζ and ωn are values at small amplitude, and
-Cnβ, Cnr, Izz and Cr the linear coefficients, whatever effects act. Records
-unlike all training are refused, and campaigns that state a scatter between runs.
+Cnβ, Cnr, Izz and Cr the linear coefficients, whatever effects act. The estimator refuses records unlike its
+training, and campaigns that state a scatter between runs.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class _DemodulatedRun:
 
     @property
     def slow(self) -> float:
-        """Variance of envelope and phase over the one by noise within the windows; 1 where they agree."""
+        """Variance of envelope and phase, over the variance due to noise within the windows; 1 where they agree."""
         return max(float(self.alone.remaining[0]) / self.alone.freedom, 1.0) if self.departs else 1.0
 
     @property
@@ -85,8 +85,8 @@ class NeuralPosterior:
     """Posterior medians and intervals by a trained network.
 
     Args:
-        weights: a safetensors file written by ``tunnel train --estimator neural_posterior``; the packaged weights
-            where None.
+        weights: a safetensors file written by ``tunnel train --estimator neural_posterior``; None: the packaged
+            weights.
     """
 
     name = "neural_posterior"
@@ -109,23 +109,27 @@ class NeuralPosterior:
         """
         for run in campaign.runs:
             loads(run, campaign.rig)
-        found = _runs(campaign.runs, self.networks["record"])
+        outcomes = _runs(campaign.runs, self.networks["record"])
         runs = tuple(
-            RunEstimate(run.id, (one,)) if isinstance(one, Status) else _described(one, campaign.sensor)
-            for run, one in zip(campaign.runs, found, strict=True)
+            RunEstimate(run.id, (outcome,))
+            if isinstance(outcome, Status)
+            else _described(outcome, campaign.sensor)
+            for run, outcome in zip(campaign.runs, outcomes, strict=True)
         )
         estimate = Estimate(campaign.name, self.name, runs)
         statuses = statuses_of_runs(campaign, runs) | noise_statuses([run.noise for run in runs])
-        linked = LinkedRuns.of(campaign, [None if isinstance(one, Status) else one.gained for one in found])
+        linked = LinkedRuns.of(
+            campaign, [None if isinstance(outcome, Status) else outcome.gained for outcome in outcomes]
+        )
         if not linked.runs:
             return replace(estimate, statuses=by_severity(statuses))
         known_runs, design = linked.runs, linked.design
         if linked.least_squares is None:
             return replace(estimate, statuses=by_severity(statuses | {Status.NOT_DETERMINED}))
         statuses = statuses | design_statuses(design, linked.least_squares[0])
-        shown = [one for place in linked.places if not isinstance(one := found[place], Status)]
+        shown = [outcome for place in linked.places if not isinstance(outcome := outcomes[place], Status)]
         features = campaign_features(
-            known_runs, [one.windows for one in shown], design, [one.alone for one in shown]
+            known_runs, [outcome.windows for outcome in shown], design, [outcome.alone for outcome in shown]
         )
         if features is None:
             nothing = Derivatives((), np.zeros(0), np.zeros((0, 0)))
@@ -163,51 +167,51 @@ class NeuralPosterior:
 
 def _runs(runs: Sequence[Run], network: TrainedPosterior) -> list[_DemodulatedRun | Status]:
     windows = [demodulate(run.record) for run in runs]
-    shown = [one for one in windows if isinstance(one, Demodulated)]
+    shown = [window for window in windows if isinstance(window, Demodulated)]
     features = iter(record_features(shown) if shown else [])
-    pairs = [None if isinstance(one, Status) else next(features) for one in windows]
+    pairs = [None if isinstance(window, Status) else next(features) for window in windows]
     weighed = iter(posteriors([pair[0] for pair in pairs if pair is not None], network))
-    found: list[_DemodulatedRun | Status] = []
-    for run, one, pair in zip(runs, windows, pairs, strict=True):
-        if isinstance(one, Status):
-            found.append(one)
+    outcomes: list[_DemodulatedRun | Status] = []
+    for run, window, pair in zip(runs, windows, pairs, strict=True):
+        if isinstance(window, Status):
+            outcomes.append(window)
         elif pair is None:
-            found.append(Status.NOT_DETERMINED)
+            outcomes.append(Status.NOT_DETERMINED)
         else:
             posterior = next(weighed)
-            seen = _DemodulatedRun(run, one, pair[1], posterior)
-            found.append(Status.UNLIKE_TRAINING if posterior.unlike else seen)
-    return found
+            demodulated = _DemodulatedRun(run, window, pair[1], posterior)
+            outcomes.append(Status.UNLIKE_TRAINING if posterior.unlike else demodulated)
+    return outcomes
 
 
-def _described(seen: _DemodulatedRun, sensor: SensorProperties) -> RunEstimate:
+def _described(demodulated: _DemodulatedRun, sensor: SensorProperties) -> RunEstimate:
     # The noise within the windows; the χ² of envelope and phase and the largest harmonic judge the model.
-    std = seen.windows.noise * float(np.sqrt(seen.windows.block))
-    rate, omega = seen.rate_and_omega
-    harmonics = np.concatenate((seen.windows.second, seen.windows.third))
-    distorted = float(np.max(np.tile(seen.windows.information, 2) * np.abs(harmonics) ** 2))
-    departs = seen.departs or bool(distorted > chdtri(2, 0.5 * MISFIT_RATE / harmonics.size))
+    std = demodulated.windows.noise * float(np.sqrt(demodulated.windows.block))
+    rate, omega = demodulated.rate_and_omega
+    harmonics = np.concatenate((demodulated.windows.second, demodulated.windows.third))
+    distorted = float(np.max(np.tile(demodulated.windows.information, 2) * np.abs(harmonics) ** 2))
+    departs = demodulated.departs or bool(distorted > chdtri(2, 0.5 * MISFIT_RATE / harmonics.size))
     stated = stated_noise(sensor)
     disagrees = False
     if stated is not None:
-        own = 1.0 / np.sqrt(2.0 * seen.windows.samples.sum())
+        own = 1.0 / np.sqrt(2.0 * demodulated.windows.samples.sum())
         tolerance = MISFIT_DEVIATIONS * float(np.hypot(NOISE_TOLERANCE, own))
         disagrees = stated > 0.0 and abs(std / stated - 1.0) > tolerance
-    noise = NoiseLevel(std, "residual", std, seen.slow, departs, disagrees)
-    if departs:  # coloured noise is no departure
-        check = residual_check(seen.run, Decay(rate, omega**2 + rate**2), sensor)
+    noise = NoiseLevel(std, "residual", std, demodulated.slow, departs, disagrees)
+    if departs:  # coloured noise is not a departure
+        check = residual_check(demodulated.run, Decay(rate, omega**2 + rate**2), sensor)
         noise = noise if check is None or check.colour is None else check.noise
-    zeta, omega_n = (seen.posterior.quantity(place, unit) for place, unit in enumerate(("1", "rad/s")))
-    weight = seen.windows.samples
-    zero = float(weight @ seen.windows.zero / weight.sum())
+    zeta, omega_n = (demodulated.posterior.quantity(place, unit) for place, unit in enumerate(("1", "rad/s")))
+    weight = demodulated.windows.samples
+    zero = float(weight @ demodulated.windows.zero / weight.sum())
     statuses = noise_statuses([noise])
-    if seen.run.spring_stiffness is None:
+    if demodulated.run.spring_stiffness is None:
         statuses.add(Status.NO_STIFFNESS)
     return RunEstimate(
-        seen.run.id,
+        demodulated.run.id,
         by_severity(statuses),
         omega_n=omega_n,
         zeta=zeta,
-        sensor_zero=Quantity(zero, seen.windows.noise / float(np.sqrt(weight.sum())), "rad"),
+        sensor_zero=Quantity(zero, demodulated.windows.noise / float(np.sqrt(weight.sum())), "rad"),
         noise=noise,
     )

@@ -25,8 +25,8 @@ class OutputError:
     """Maximum likelihood with white measurement noise and no process noise.
 
     Args:
-        cycles_per_window: periods in each window of a run; where None three, or one in a record of fewer than
-            twelve cycles.
+        cycles_per_window: periods in each window of a run; None: three, or one in a record of fewer than twelve
+            cycles.
     """
 
     name: ClassVar[str] = "output_error"
@@ -40,7 +40,7 @@ class OutputError:
             TunnelError: when a wind-on run states no air density.
         """
         for run in campaign.runs:
-            loads(run, campaign.rig)  # refuses a wind-on run without density before the fits
+            loads(run, campaign.rig)  # a wind-on run without density is refused before the fits
         fitted = [
             identify_run(run, campaign.sensor, cycles_per_window=self.cycles_per_window)
             for run in counted(campaign.runs)

@@ -1,6 +1,6 @@
 """Ambient vibration: a record without a release, in which a random moment keeps the body in motion.
 
-The rate of the decay that fits it best is an accident of the record, and not the damping.
+The rate of the best-fitting decay is then an accident of the record, not the damping.
 """
 
 from __future__ import annotations
@@ -11,19 +11,20 @@ from identification.signal.frequency import pencil_decay, starting_frequency, th
 from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.record import Array, evenly_spaced
 
-# A free decay explains its record, and two of them explain a beat. Random motion over many times its own memory is
-# explained by neither: of 60 simulated records of 1/(ζ ω) times 3 to 50, by less than these shares.
+# A free decay explains its record, and two free decays explain a beat. Neither explains random motion over
+# many times its memory: in 60 simulated records of 3 to 50 times 1/(ζ ω), both explain less than these
+# shares.
 _ONE_EXPLAINS = 0.6
 _TWO_EXPLAIN = 0.85
-_BLOCK = 3  # cycles, whose amplitude is one value
-_LEAST_BLOCKS = 8  # fewer do not show that the amplitude comes and goes
+_BLOCK = 3  # cycles with one value of the amplitude
+_LEAST_BLOCKS = 8  # minimum number of such values: fewer do not show that the amplitude varies
 _EVEN = 3.0  # ratio of the power in the last third and the first: a decay of any use has more
-_START = 2.0  # of the median amplitude: a release is larger
-_RISES = 0.6  # of its falls: how far the amplitude rises again; in a decay with noise much less
-_LEAST_RISE = 1.0  # of the logarithm of the amplitude, altogether
-_FINER = 4  # frequencies for each of a Fourier transform
-_LARGEST = 50.0  # exponent
-_SMOOTH = 0.5  # correlation of neighbours in the rest: less is noise of the sensor
+_START = 2.0  # multiple of the median amplitude: a release is larger
+_RISES = 0.6  # rise of the amplitude as a share of its falls; in a decay with noise much less
+_LEAST_RISE = 1.0  # total change of the amplitude's logarithm
+_FINER = 4  # number of tried frequencies for each of a Fourier transform
+_LARGEST = 50.0  # maximum exponent
+_SMOOTH = 0.5  # minimum correlation of neighbours in the rest: less is noise of the sensor
 
 
 def is_ambient(run: Run) -> bool:
@@ -61,7 +62,7 @@ def is_ambient(run: Run) -> bool:
             return False
     if not found or float(rest[1:] @ rest[:-1]) < _SMOOTH * float(rest @ rest):
         return False
-    lines: list[tuple[float, float]] = []  # of a beat of two steady oscillations, between which the poles lie
+    lines: list[tuple[float, float]] = []  # two steady oscillations of a beat, between which the poles lie
     rest = values
     for _ in range(2):
         spectrum = np.abs(np.fft.rfft(rest, _FINER * rest.size))
@@ -71,7 +72,7 @@ def is_ambient(run: Run) -> bool:
 
 
 def _unexplained(values: Array, time: Array, decays: list[tuple[float, float]]) -> Array:
-    """The rest of a motion beside decays of some rates and frequencies (1/s, rad/s), shape (n,)."""
+    """The remainder of a motion after decays of some rates and frequencies (1/s, rad/s) are fitted, shape (n,)."""
     columns = [np.ones(time.size)]
     for rate, omega in decays:
         envelope = np.exp(np.clip(-rate * (time - time[0]), -_LARGEST, _LARGEST))

@@ -26,10 +26,11 @@ from tunnel_sim.vocabulary.quantities import Seconds
 from tunnel_sim.vocabulary.record import CLOCK_TOLERANCE, Array, Record
 
 _FINEST = 9  # decimals: no logger rounds to less than a nanosecond
-_ON_LATTICE = 1e-3  # of the lattice's step: rounding errors of the decimals themselves
-_TIMER_DECIMALS = 10  # decimal steps that a timer's step must exceed, or any stamps would fit its lattice
+_ON_LATTICE = 1e-3  # share of the lattice's step: rounding errors of the decimals themselves
+# decimal steps that a timer's step must exceed, because any stamps would fit a finer lattice
+_TIMER_DECIMALS = 10
 _SWEEPS = 8
-_NO_GAP = 1.75  # usual steps: a longer one may be a gap
+_NO_GAP = 1.75  # multiple of the usual step: a longer step may be a gap
 _MOST_MISSING = 1e3  # ticks per sample: with more, the stamps are not from one clock
 _SLOW = 0.3  # mean square of a step over the variance, 4 sin²(π/n): n = 11.5 samples per cycle
 
@@ -53,7 +54,7 @@ def noted_readings(campaign: Campaign) -> tuple[Remark, ...]:
 
 
 def _few_samples(campaign: Campaign) -> tuple[Remark, ...]:
-    """Note free decays of few samples per cycle; none where the campaign states that."""
+    """Note free decays with few samples per cycle; none if the campaign states that."""
     if campaign.sensor.plausible is False:
         return ()
     found = []
@@ -66,7 +67,7 @@ def _few_samples(campaign: Campaign) -> tuple[Remark, ...]:
 
 
 def _wide_swings(campaign: Campaign, remedy: str) -> tuple[Remark, ...]:
-    """Note the runs that swing by more than half a turn to either side; none where the campaign states that."""
+    """Note the runs that swing by more than half a turn to either side; none if the campaign states that."""
     sensor = campaign.sensor
     swings = {run.id: _swing(run.record, sensor.derivative) for run in campaign.runs}
     wide = tuple(name for name, swing in swings.items() if swing > np.pi)
@@ -88,10 +89,10 @@ def _swing(record: Record, derivative: int) -> float:
 
 
 def as_angles(estimate: Estimate, sensor: SensorProperties) -> Estimate:
-    """Convert an estimate from readings taken for angles to angles; an estimate from angles is returned unchanged.
+    """Convert an estimate from readings mistaken for angles to angles; others are returned unchanged.
 
-    Amplitudes are then angles, and zeros are in the unit of the reading. The initial state and the intensity of
-    a random moment refer to the reading and are left out.
+    Amplitudes become angles, and zeros keep the unit of the reading. The initial state and the intensity of a
+    random moment refer to the reading and are left out.
     """
     if sensor.derivative == 0:
         return estimate
@@ -122,10 +123,10 @@ def _in_unit(quantity: Quantity | None, unit: str) -> Quantity | None:
 def examine(campaign: Campaign) -> Examined:
     """Check a campaign's records against one another and against their stated conditions.
 
-    Records are mended, and statements that they contradict are refused or noted, by the slips of
-    `identification.examination.slips.table`. Rounded time stamps are replaced by the clock behind them. Samples
-    before the release, and most of a long rest beside the centre, are cut off. Wind-on runs in a limit cycle are
-    cut to their linear growth, or left out. Each run has its own zero where the zeros differ.
+    Records are mended, and contradicted statements are refused or noted, by the slips of
+    `identification.examination.slips.table`. The clock behind rounded time stamps replaces them. Samples before
+    the release, and most of a long rest off the centre, are cut off. Wind-on runs in a limit cycle are cut to
+    their linear growth, or left out. Each run has its own zero where the zeros differ.
 
     Raises:
         TunnelError: when a wind-on run states no air density, or a stated value is out of range.
@@ -146,28 +147,28 @@ def measured(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...], SlipEvid
     """
     for run in campaign.runs:
         loads(run, campaign.rig)
-    kept, faults = mended(campaign)
+    usable, faults = mended(campaign)
     refused = tuple(remark for remark in faults if remark.outcome is Outcome.REFUSED)
     if refused:
         return campaign, refused, None
-    noted = noted_readings(kept)
-    kept, clocks = with_clocks(kept)
+    noted = noted_readings(usable)
+    usable, clocks = with_clocks(usable)
     # Driven runs neither begin with a release nor end at rest, and their input is known.
-    driven, order = kept.driven_runs, [run.id for run in kept.runs]
-    if driven and not kept.decays:
-        return kept, (*faults, *noted, *clocks), None
+    driven, order = usable.driven_runs, [run.id for run in usable.runs]
+    if driven and not usable.decays:
+        return usable, (*faults, *noted, *clocks), None
     if driven:
-        kept = replace(kept, runs=kept.decays)
-    kept, releases = from_releases(kept)
-    kept, rests = without_rest(kept)
-    kept, excited = self_excited_runs(kept)
-    kept, zeros = with_zeros(kept)
-    swings = tuple(swing for run in kept.runs if (swing := swing_of(run)) is not None)
-    evidence = SlipEvidence(kept, campaign, swings)
+        usable = replace(usable, runs=usable.decays)
+    usable, releases = from_releases(usable)
+    usable, rests = without_rest(usable)
+    usable, excited = self_excited_runs(usable)
+    usable, zeros = with_zeros(usable)
+    swings = tuple(swing for run in usable.runs if (swing := swing_of(run)) is not None)
+    evidence = SlipEvidence(usable, campaign, swings)
     if driven:
-        found = {run.id: run for run in (*kept.runs, *driven)}
-        kept = replace(kept, runs=tuple(found[name] for name in order if name in found))
-    return kept, (*faults, *noted, *clocks, *releases, *rests, *excited, *zeros), evidence
+        by_id = {run.id: run for run in (*usable.runs, *driven)}
+        usable = replace(usable, runs=tuple(by_id[name] for name in order if name in by_id))
+    return usable, (*faults, *noted, *clocks, *releases, *rests, *excited, *zeros), evidence
 
 
 def from_releases(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
@@ -189,8 +190,8 @@ class SampleClock:
     """The uniform clock of a record's samples.
 
     Args:
-        place: of every sample on the clock, shape (n,); increasing, with jumps where samples are missing.
-        time: of every sample by the clock, shape (n,), s.
+        place: place of every sample on the clock, shape (n,); increasing, with jumps where samples are missing.
+        time: time of every sample by the clock, shape (n,), s.
         away: largest deviation of a time stamp from the clock, s.
     """
 
@@ -246,11 +247,11 @@ def with_clocks(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
 def find_clock(time_s: Array) -> SampleClock | None:
     """The uniform clock that explains time stamps; samples may be missing. None if there is none.
 
-    The stamps are its ticks, rounded to their last decimal or to the ticks of a logger's timer. They may be off by
-    a whole step: rounded or truncated, by a logger that is itself a little late.
+    The stamps are ticks of the clock, rounded to their last decimal or to the ticks of a logger's timer. They
+    may be off by a whole step: a logger that is itself a little late may round or truncate them.
 
     Args:
-        time_s: stamps, increasing, shape (n,), s.
+        time_s: time stamps, increasing, shape (n,), s.
     """
     steps = np.diff(time_s)
     usual = steps[steps < _NO_GAP * np.median(steps)]

@@ -1,9 +1,9 @@
 """The start, the end and the zero of the free motion in a record.
 
-It begins after a hand, a latch or a sensor at rest. Free motion crosses its centre every half cycle: in a longer
-interval between two crossings the body was held, moved by hand, or at rest. A hold in mid-record shorter than
-about three quarters of a cycle leaves no such interval and is not detected. At the start of a record a hand that
-pulls the body aside is also recognised by its slowness: a free swing takes no longer out than back.
+It begins after a hand, a latch or a sensor at rest. Free motion crosses its centre every half cycle: in a
+longer interval between two crossings the body was held, moved by hand, or at rest. A hold in mid-record shorter
+than about three quarters of a cycle leaves no such interval and is not detected. A hand that pulls the body
+aside at the start of a record is also recognised by its slowness: a free swing takes no longer out than back.
 """
 
 from __future__ import annotations
@@ -22,11 +22,12 @@ from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties, speed_groups
 from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced
 
-_NEAR_LARGEST = 0.9  # of the largest swing: the last swing of this size comes after the release
+_NEAR_LARGEST = 0.9  # share of the largest swing: the last swing of this size comes after the release
 _LEAST_SAMPLES = 16
-_SMOOTHED = 0.125  # of a cycle, width of the moving average: it reduces noise and hum, and hardly the swing
-_BAND = 0.1  # of the largest swing: a crossing counts if the motion goes this far beyond the centre
-_NOISE_MARGIN = 5.0  # standard deviations of the smoothed noise, if more: no crossing by chance
+# width of the moving average, as a share of a cycle: it reduces noise and hum, and hardly the swing
+_SMOOTHED = 0.125
+_BAND = 0.1  # share of the largest swing: a crossing counts if the motion goes this far beyond the centre
+_NOISE_MARGIN = 5.0  # standard deviations of the smoothed noise, if more: no crossing is then due to chance
 _WIDEST_BAND = 0.3
 # A half cycle may be longer than the next ones because of its amplitude alone: a pendulum released at 160 degrees
 # takes twice the time of its small swings.
@@ -35,8 +36,9 @@ _SLOWER = 1.25  # a pull takes this many times as long as the swing back; a free
 _GROWTH = 0.02  # e-folds of growth over the fitted half cycles: a growing motion has no release
 # Of a half cycle: the release is a quarter cycle back, the previous turning point three quarters.
 _CARRIED_BACK = 0.75
-_FITTED_HALVES = 4.0  # half cycles after the release that are fitted and extrapolated backwards
-_REGULAR = 2  # half cycles of about the usual length before a release; more are an earlier free motion
+_FITTED_HALVES = 4.0  # number of half cycles after the release that are fitted and extrapolated backwards
+# number of half cycles of about the usual length before a release; more are an earlier free motion
+_REGULAR = 2
 
 
 def find_release(record: Record, sensor: SensorProperties) -> int:
@@ -118,9 +120,9 @@ class Centre:
 
     Args:
         zero: rad (rad/s or rad/s² where the reading is a rate or an acceleration).
-        std: its standard deviation, in the same unit; it includes the change along the run.
+        std: standard deviation of the zero, in the same unit; it includes the change along the run.
         swing: half the largest distance of two neighbouring peaks, in the same unit.
-        square: mean square of the clear swings, in that unit squared.
+        square: mean square of the clear swings, in the square of that unit.
         omega: angular frequency of the oscillation, rad/s.
     """
 
@@ -133,16 +135,17 @@ class Centre:
 
 
 _EXPLAINED_TO = (
-    0.01  # relative tolerance of a shift from its cause: a wind varies by some tenths of a per cent
+    0.01  # relative tolerance between a shift and its cause: a wind varies by some tenths of a per cent
 )
-_LEAST_BEYOND = 3  # runs beyond the number of shifts, for a comparison of the remaining zeros
+# minimum number of runs beyond the number of shifts, for a comparison of the remaining zeros
+_LEAST_BEYOND = 3
 
 
 def with_zeros(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
     """Give every run its own zero where the records show different zeros, unless the campaign states one.
 
     Runs of equal spring, wind and swing are compared: with an asymmetric spring the centre depends on the
-    amplitude, and in a stream at an angle on the wind. All runs are also compared, after removing such shifts.
+    amplitude, and in a stream at an angle on the wind. After removing such shifts, all runs are also compared.
     """
     if campaign.sensor.zero not in (None, "auto"):
         return campaign, ()
@@ -215,7 +218,7 @@ def _scatter(centres: list[Centre], shifts: Array) -> float:
 
 
 def centre_of(run: Run, resolution: float) -> Centre | None:
-    """The centre of a run's oscillation, from its peaks; None where there are too few clear ones.
+    """The centre of a run's oscillation, from its peaks; None if there are too few clear ones.
 
     Peaks on both sides are equally far from the centre for any symmetric spring and any damping. This includes dry
     friction, although the body may come to rest elsewhere.
@@ -246,9 +249,10 @@ def centre_of(run: Run, resolution: float) -> Centre | None:
 
 
 _SQUARABLE = 1e100  # of the reading's unit: squares of larger readings overflow
-_RESTING = 0.01  # of the largest excursion: the body rests while the reading stays as near its last value
+# share of the largest excursion: the body rests while the reading stays this close to its last value
+_RESTING = 0.01
 _KEPT = 3.0  # cycles of rest to keep: they show that the motion ended, and where
-_SETTLED = 0.25  # of the distance from the centre: a resting reading that changes more is drifting
+_SETTLED = 0.25  # share of the distance from the centre: a resting reading that changes more is drifting
 
 
 def without_rest(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:

@@ -23,8 +23,8 @@ from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.quantities import Frequencies
 from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced
 
-_UNKNOWNS = 5  # decay rate, stiffness, zero, initial angle and rate
-_LEAST_SAMPLES = 30  # in a part of a record whose poles are found separately
+_UNKNOWNS = 5  # unknowns: decay rate, stiffness, zero, initial angle and rate
+_LEAST_SAMPLES = 30  # minimum number of samples in a part of a record with separate poles
 _E_FOLDING = 0.5  # e-folds in the first part: both parts then determine the frequency about equally well
 
 
@@ -34,17 +34,17 @@ class Swing:
 
     Args:
         stiffness: k = ωn², 1/s².
-        stiffness_std: its standard deviation, 1/s². It includes the change of k along the run, which limits the
-            knowledge of a frequency that depends on the amplitude.
+        stiffness_std: standard deviation of k, 1/s². It includes the change of k along the run, which limits
+            the accuracy of a frequency that depends on the amplitude.
         rate: a = ζωn, 1/s; negative where the motion grows.
-        rate_std: its standard deviation, 1/s.
-        rate_error: standard deviation of a by the residual's own correlation, and the change of a along the run
-            between its first part and the rest, 1/s.
+        rate_std: standard deviation of a, 1/s.
+        rate_error: standard deviation of a with the residual's own correlation and the change of a between the
+            run's first part and the rest, 1/s.
         zero: the sensor's zero, rad.
-        zero_std: its standard deviation, rad.
+        zero_std: standard deviation of the zero, rad.
         time: since the start of the record, thinned, shape (n,), s.
         motion: reading less the sensor's zero, thinned, shape (n,), rad.
-        amplitude: of the fitted decay at the start of the record, rad.
+        amplitude: amplitude of the fitted decay at the start of the record, rad.
     """
 
     run: Run
@@ -112,7 +112,7 @@ def _correlated(residual: Array, half_cycle: float) -> float:
     """The factor, up to 1, on standard deviations that assume a residual correlated over half a cycle.
 
     Args:
-        residual: shape (n,), rad.
+        residual: residual, shape (n,), rad.
         half_cycle: in samples.
     """
     block = max(round(half_cycle), 1)
@@ -147,7 +147,7 @@ def growing_runs(swings: Sequence[Swing]) -> tuple[Remark, ...]:
     return (Remark(Outcome.REFUSED, tuple(ids), what, remedy),) if ids else ()
 
 
-_CYCLES = 3.0  # of the strongest oscillation, in a window
+_CYCLES = 3.0  # cycles of the strongest oscillation in a window
 _KEYS = ("time_s", "amplitude_rad", "growth_rate", "frequency_hz")
 
 
@@ -176,9 +176,9 @@ class AmplitudeWindows:
 
 
 def self_excited_runs(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
-    """Find wind-on runs whose motion grows, or neither grows nor decays, with a remark and figures for each.
+    """Find wind-on runs with motion that grows, or stays constant, with a remark and figures for each.
 
-    A run that settles in a limit cycle is cut to the part of linear growth, or left out if there is no such part.
+    A run that settles in a limit cycle is cut to its linear growth, or left out if it has none.
     """
     kept, remarks = [], []
     for run in campaign.runs:

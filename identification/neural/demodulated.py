@@ -21,12 +21,12 @@ from tunnel_sim.vocabulary.record import Array, Record
 
 WINDOWS = 32
 LEAST_WINDOWS = 4
-_PER_CYCLE = 24.0  # least number of block means per period
-_LEAST_SAMPLES = 12  # in a window: seven unknowns are fitted to it
-_PASSES = 3  # each demodulates with the decay of the previous one
+_PER_CYCLE = 24.0  # minimum number of block means per period
+_LEAST_SAMPLES = 12  # number of samples in a window: seven unknowns are fitted to it
+_PASSES = 3  # rounds of demodulation, each with the decay of the previous one
 _LINEAR = 50.0  # information below which the logarithm of a noisy amplitude is replaced by its linear part
 _ROUGH = 1e-6  # least noise over the swing: a hundred times the error of three passes
-_SEEN = 0.5  # amplitude over the noise of a window's amplitude, down to which the record is used
+_SEEN = 0.5  # minimum amplitude over the noise of a window's amplitude for the record to be used
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,19 +35,19 @@ class Demodulated:
 
     Args:
         omega: damped angular frequency of the demodulation, rad/s.
-        rate: its decay rate, 1/s.
+        rate: decay rate of the demodulation, 1/s.
         time: middles of the windows since the first sample, shape (w,), s.
-        logarithm: of the amplitude over the oscillation's, shape (w,).
+        logarithm: logarithm of the amplitude over the oscillation's, shape (w,).
         phase: relative to the oscillation, shape (w,), rad.
         information: inverse variance of either, shape (w,).
-        amplitude: of the oscillation, shape (w,), rad.
+        amplitude: amplitude of the oscillation, shape (w,), rad.
         zero: mean of the reading, shape (w,), rad.
         second: complex amplitude of the second harmonic over the amplitude, in its phase, shape (w,).
-        third: of the third harmonic, shape (w,).
+        third: the same for the third harmonic, shape (w,).
         noise: standard deviation of a block mean within the windows, rad.
         samples: block means in each window, shape (w,).
         fast_noise: noise between neighbouring samples of the record over white noise of the same level.
-        duration: of the record, s.
+        duration: duration of the record, s.
     """
 
     omega: float
@@ -77,7 +77,7 @@ class _Windows:
 
 
 def demodulate(record: Record) -> Demodulated | Status:
-    """Reduce a record to windows; a status where nothing oscillates, or too few periods exceed the noise."""
+    """Reduce a record to windows; a status if nothing oscillates, or too few periods exceed the noise."""
     frequency = starting_frequency(record)
     if frequency is None:
         return Status.NO_OSCILLATION
@@ -191,7 +191,7 @@ def _fit_windows(reading: Reading, omega: float, rate: float, span: float, harmo
 Places = NDArray[np.intp]
 Column = tuple[Array | None, Array | None]
 """Columns of the logarithm of the amplitude and of the phase; None: zero."""
-_FLOOR = 0.02  # least amplitude over the first: noise would dominate inverse powers of smaller ones
+_FLOOR = 0.02  # minimum amplitude over the first: noise would dominate inverse powers of smaller amplitudes
 _POWERS = (-1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0)
 _SETTLING = 4.0  # time constants in a record
 
@@ -202,10 +202,10 @@ class RivalWindows:
 
     Args:
         sizes: number of windows of each run, shape (runs,).
-        run: number of each window's run, shape (w,).
+        run: index of each window's run, shape (w,).
         omega: angular frequency of each run, shape (runs,), rad/s.
         rate: decay rate of each run, shape (runs,), 1/s.
-        powers: of the amplitude, by exponent, shape (w,) each.
+        powers: powers of the amplitude, by exponent, shape (w,) each.
         integrals: of these powers over time, by exponent, shape (w,) each.
         drift: integral of the time as a share of the record, shape (w,), s.
         settling: integral of a step that settles, shape (w,), s.

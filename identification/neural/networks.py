@@ -66,7 +66,7 @@ class DataSpec:
         return cls(**{**data, **pairs})
 
     def to_network(self, values: Array) -> Array:
-        """t3 [s] or ωn [rad/s] in the form of the second network, any shape."""
+        """t3 [s] or ωn [rad/s] in the form used by the second network, any shape."""
         return np.log(values) if self.frequency_scale == LOGARITHMIC else np.asarray(values)
 
 
@@ -84,7 +84,7 @@ def training_pairs(spec: DataSpec, which: str) -> tuple[Array, Array]:
 def held_out_points(spec: DataSpec, rng: np.random.Generator) -> tuple[Array, Array]:
     """Damping ratios and frequencies [rad/s] outside every training set, shapes (test_count,).
 
-    Half of them are uniform in the logarithm, so that the low ends of the range are tested too.
+    Half of the points are uniform in the logarithm, so that the low ends of the range are tested too.
     """
     found = []
     for low, high in (spec.zeta_range, spec.omega_range):
@@ -122,7 +122,8 @@ class Network:
 
     Args:
         weights: matrix (row by row) and bias of each layer in turn, shape (n,).
-        directions: eigenvectors of the data's information that is significant beside the prior, shape (k, n).
+        directions: eigenvectors of the data's information that are significant compared with the prior, shape
+            (k, n).
         precision: posterior precision along each of them, shape (k,).
         prior_precision: of the weights along all other directions, 2α; dimensionless, like the scaled quantities.
     """
@@ -252,7 +253,7 @@ class Networks:
         return float(by_zeta) * omega, float(by_time) * omega / t3
 
     def own_stds(self, zeta: float, t3: Seconds) -> tuple[float, float]:
-        """Standard deviations due to the networks, of ζ and, relative, of ωn.
+        """Standard deviations due to the networks: of ζ and, relative, of ωn.
 
         They combine the posterior of the weights, at the noise-free response of this ζ, and the largest error of
         the test set as the half-width of a rectangular distribution (GUM 4.3.7).

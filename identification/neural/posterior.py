@@ -1,8 +1,9 @@
 """The network that weighs the rivals, from all rivals and all runs; its files, and its posterior.
 
-The posterior of each quantity is the mixture of the rivals' normal distributions, scaled and widened: the network
-only learns which rival to believe, and how far. It runs in NumPy for an estimate and in torch for training.
-Trained networks are stored as safetensors, with their training record beside them as JSON, without pickle.
+The posterior of each quantity is the mixture of the rivals' normal distributions, scaled and widened: the
+network only learns which rival to believe, and how far. It runs in NumPy for an estimate and in torch for
+training. Trained networks are stored as safetensors, with their training record beside them as JSON, without
+pickle.
 """
 
 from __future__ import annotations
@@ -23,10 +24,10 @@ from identification.show.quantity import Quantity
 from tunnel_sim.vocabulary.record import Array
 
 LEVELS = (0.025, 0.5, 0.975)
-NORMAL_WIDTH = 3.92  # of a normal distribution's 95 % interval, in standard deviations
+NORMAL_WIDTH = 3.92  # width of a normal distribution's 95 % interval, in standard deviations
 _HALVINGS = 36
 _FAR = 12.0  # standard deviations beyond which no component has weight
-_NEGLIGIBLE = 1e-9  # weight of a component that does not change the quantiles
+_NEGLIGIBLE = 1e-9  # weight of a component below which it does not change the quantiles
 
 
 def distribution(weights: Array, means: Array, stds: Array, values: Array) -> Array:
@@ -62,8 +63,8 @@ Tensor = Any
 """An array of NumPy or a tensor of torch."""
 
 TOKEN, RUN, CONTEXT, HEAD = 32, 32, 128, 32
-_GAIN = 0.5  # greatest change of a rival's shift, as a share
-_CLIP = 4.0  # of standardised inputs: records with hardly any noise are far outside
+_GAIN = 0.5  # maximum relative change of a rival's shift
+_CLIP = 4.0  # limit of standardised inputs: records with hardly any noise are far outside
 _ALLOWANCE = -6.0  # for a rival of one column: there are fifty of them, and their sizes are not known
 _SIZES = (-4.0, 9.0)  # of the logarithms of widths
 
@@ -73,12 +74,12 @@ class Output:
     """The mixture of each quantity in standard deviations of the nominal fit; one sample per row.
 
     Args:
-        logarithms: of the weights, shape (b, r).
+        logarithms: logarithms of the weights, shape (b, r).
         means: shape (b, r, d).
         scales: factor on each rival's own width, shape (b, r, 1).
         extras: added variance, shape (b, r, d).
         effects: logits of the effects' probabilities, which only the training uses, shape (b, e).
-        context: of the sample, shape (b, CONTEXT), for the score of unlikeness.
+        context: context of the sample, shape (b, CONTEXT), for the score of unlikeness.
     """
 
     logarithms: Tensor
@@ -121,17 +122,17 @@ def forward(
 ) -> Output:
     """Put samples through the network.
 
-    Every rival passes through the same layers, and every run through others; runs are pooled, so their order and
-    number do not matter.
+    Every rival passes through one set of layers, and every run through another; runs are pooled, so their order
+    and number do not matter.
 
     Args:
         xp: numpy or torch.
         weights: as `weight_shapes`, with the scalings ``rivals.mean``, ``rivals.std``, ``runs.mean``,
             ``runs.std``.
         rivals: features, shape (b, r, f).
-        runs: features, shape (b, n, k); after them 1 for a run and 0 for padding.
+        runs: features, shape (b, n, k), followed by 1 for a run and 0 for padding.
         valid: 1 for rivals that apply, shape (b, r).
-        shifts: of the quantities under each rival, shape (b, r, d).
+        shifts: shifts of the quantities under each rival, shape (b, r, d).
     """
 
     def layer(name: str, values: Tensor) -> Tensor:
@@ -296,7 +297,7 @@ class Posterior:
 
 
 def posteriors(samples: Sequence[Features], network: TrainedPosterior) -> list[Posterior]:
-    """Put samples of one kind through its network."""
+    """Put samples of one kind through the network of that kind."""
     if not samples:
         return []
     shifts = np.stack([sample.shifts for sample in samples])
@@ -304,7 +305,7 @@ def posteriors(samples: Sequence[Features], network: TrainedPosterior) -> list[P
     known = np.stack([sample.known for sample in samples])
     longest = max(len(sample.runs) for sample in samples)
     runs = np.zeros((len(samples), longest, samples[0].runs.shape[1] + 1))
-    for place, sample in enumerate(samples):  # with 1 after the features of a run, and 0 for padding
+    for place, sample in enumerate(samples):  # a 1 follows the features of a run, and 0 marks padding
         runs[place, : len(sample.runs), :-1], runs[place, : len(sample.runs), -1] = sample.runs, 1.0
     output = forward(
         np,

@@ -22,11 +22,11 @@ from tunnel_sim.vocabulary.record import Array
 
 Mask = NDArray[np.bool_]
 
-_ANY = (-1.0, -0.5, 0.5, 1.0, 2.0, 4.0)  # all but the linear one
+_ANY = (-1.0, -0.5, 0.5, 1.0, 2.0, 4.0)  # every exponent except the linear one
 _OFFSETS = (0.0, -0.35)  # powers of the speed in an error of the speed
-_LAGS = (-0.3, 0.2, 0.8)  # of the air's moment, l/V
+_LAGS = (-0.3, 0.2, 0.8)  # lags of the air's moment, in l/V
 SPRINGS = 4
-"""Number of different springs, from the softest, that each have a rival of their own."""
+"""Number of different springs, from the softest, with a separate rival each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class RivalConditions:
         stiffness_load: ½ρV²·A·l, shape (runs,), N m; 0 with the wind off.
         damping_load: ½ρV·A·l², shape (runs,), N m s; 0 with the wind off.
         speed: V as a ratio to the largest of the campaign, shape (runs,); 0 with the wind off.
-        spring: number of the spring in the campaign, from the softest, shape (runs,).
+        spring: index of the spring in the campaign, from the softest, shape (runs,).
         air: Cnβ and Cnr of the nominal fit, 1/rad; 0 where they are not determined.
     """
 
@@ -51,7 +51,7 @@ class RivalConditions:
 
     @classmethod
     def of(cls, runs: Sequence[Run], design: Design, air: tuple[float, float]) -> RivalConditions:
-        """Conditions of runs that the design links, each with its spring."""
+        """Conditions of the runs that the design links, each with its spring."""
         springs = np.array([run.spring_stiffness for run in runs], dtype=np.float64)
         speeds = np.array([run.wind_speed for run in runs])
         speeds = speeds / max(float(speeds.max()), 1e-300)
@@ -60,7 +60,7 @@ class RivalConditions:
 
 
 def _readings(w: RivalWindows) -> list[Column]:
-    """A reading whose amplitude or phase depends on the amplitude."""
+    """A reading with an amplitude or phase that depends on the amplitude."""
     logarithms = [(w.powers[power], None) for power in (-1.0, 2.0, 4.0)]
     return [*logarithms, *((None, w.powers[power]) for power in (-1.0, 2.0))]
 
@@ -81,7 +81,7 @@ def _drifts_and_steps(w: RivalWindows, stiffness: Array | float) -> list[Column]
 
 def campaign_columns(w: RivalWindows, c: RivalConditions) -> Array:
     """The columns of the rivals of a campaign, shape (2 w, 51)."""
-    one, ones = np.ones_like(c.stiffness), np.ones(w.time.size)
+    constant, ones = np.ones_like(c.stiffness), np.ones(w.time.size)
     on = c.speed > 0.0
     damped = [
         *((power, w.omega**power) for power in (-1.0, -0.5, 0.5, 1.0, 2.0)),
@@ -92,7 +92,7 @@ def campaign_columns(w: RivalWindows, c: RivalConditions) -> Array:
     ]
     stiff = [
         *((power, c.stiffness) for power in _ANY),
-        *((power, one) for power in (-1.0, 0.0, 2.0)),
+        *((power, constant) for power in (-1.0, 0.0, 2.0)),
         *((power, c.stiffness_load) for power in (-1.0, 1.0, 2.0, 4.0)),
         (0.0, c.stiffness**2),
         (0.0, c.stiffness * c.stiffness_load),
@@ -123,7 +123,7 @@ def campaign_columns(w: RivalWindows, c: RivalConditions) -> Array:
 
 
 def best_step(run: Demodulated, values: Array) -> Array:
-    """The step, from 0 to 1, beside a straight line, that lowers χ² most, shape (w,).
+    """The step, from 0 to 1, added to a straight line, that lowers χ² most, shape (w,).
 
     Args:
         values: logarithm or phase, shape (w,), dimensionless.
@@ -143,7 +143,7 @@ def best_step(run: Demodulated, values: Array) -> Array:
 SETS = (2, 3, 4)
 """Numbers of columns in the larger rivals, found by forward selection; one more rival has all columns."""
 MORE = len(SETS) + 2
-"""Rivals besides the ones of one column: the nominal model first; the sets and all columns together last."""
+"""Rivals in addition to those with one column: the nominal model first; the sets and all columns together last."""
 _PRIOR = 1e-6  # variance of a column's own fit over the prior variance of its effect: 1000 deviations
 _PRIOR_ALL = 1e-3  # the same ratio where all columns act together
 
@@ -153,9 +153,9 @@ class Rivals:
     """The nominal model and its rivals, nominal first.
 
     Args:
-        parameters: of the nominal model, shape (p,).
+        parameters: parameters of the nominal model, shape (p,).
         shifts: contribution of each rival to them, shape (r, p).
-        covariances: of the parameters under each rival, shape (r, p, p).
+        covariances: covariance of the parameters under each rival, shape (r, p, p).
         scores: signed significance of a rival's column, shape (r,); for a set, the root of its fall of χ².
         own: share of a column that the nominal parameters cannot imitate, shape (r,).
         remaining: χ² of each rival, shape (r,).
@@ -175,29 +175,29 @@ class Rivals:
 def fit_rivals(values: Array, design: Array, columns: Array, weights: Array, taken: int) -> Rivals | None:
     """Fit the nominal model and every rival; None where the data do not determine the nominal parameters.
 
-    A weak normal prior on every column keeps the parameters finite where it is nearly a combination of the
-    nominal ones.
+    A weak normal prior on every column keeps the parameters finite if the column is nearly a combination of the
+    nominal columns.
 
     Args:
         values: data, shape (n,).
         design: columns of the nominal parameters, shape (n, p).
-        columns: of the rivals, shape (n, c); zero where a rival does not apply.
+        columns: columns of the rivals, shape (n, c); zero where a rival does not apply.
         weights: inverse variances, shape (n,).
         taken: number of unknowns eliminated beforehand.
     """
     root = np.sqrt(weights)
-    nominal, seen = design * root[:, None], columns * root[:, None]
+    nominal, scaled = design * root[:, None], columns * root[:, None]
     normal = nominal.T @ nominal
     if not determined(normal):
         return None
     covariance = inverse(normal)
     parameters = scaled_solve(normal, nominal.T @ (root * values))
     rest = root * values - nominal @ parameters
-    full = np.einsum("nc,nc->c", seen, seen)
+    full = np.einsum("nc,nc->c", scaled, scaled)
     valid = full > 0.0
-    seen = seen / np.sqrt(np.where(valid, full, 1.0))
-    moves = covariance @ (nominal.T @ seen)  # (p, c): shift of the parameters by each column
-    own = seen - nominal @ moves
+    scaled = scaled / np.sqrt(np.where(valid, full, 1.0))
+    moves = covariance @ (nominal.T @ scaled)  # (p, c): shift of the parameters by each column
+    own = scaled - nominal @ moves
     gram, aim = own.T @ own, own.T @ rest
     alone = np.diag(gram).copy()
     sizes = aim / (alone + _PRIOR)
@@ -237,16 +237,16 @@ def forward_selection(gram: Array, aim: Array, number: int) -> list[int]:
         gram: products of the columns, shape (c, c).
         aim: products of the columns with the data, shape (c,).
     """
-    left, own = aim.copy(), np.diag(gram).copy()
+    rest, own = aim.copy(), np.diag(gram).copy()
     gram = gram.copy()
     chosen: list[int] = []
     for _ in range(min(number, aim.size)):
-        gain = left**2 / (own + _PRIOR)
+        gain = rest**2 / (own + _PRIOR)
         gain[chosen] = -1.0
         best = int(np.argmax(gain))
         chosen.append(best)
         share = gram[:, best] / (own[best] + _PRIOR)
-        left = left - share * left[best]
+        rest = rest - share * rest[best]
         gram = gram - np.outer(share, gram[best])
         own = np.maximum(np.diag(gram), 0.0)
     return chosen
@@ -255,9 +255,9 @@ def forward_selection(gram: Array, aim: Array, number: int) -> list[int]:
 RECORD_NAMES = ("zeta", "omega_n")
 CAMPAIGN_NAMES = PARAMETERS
 LEVEL = 2
-"""Column of a rival's features: the logarithm of its χ² over the freedom, and a little."""
+"""Column of a rival's features: the logarithm of its χ² over the freedom, plus a small constant."""
 OWN = 20
-"""Features of a run besides the significance of its rivals."""
+"""Features of a run in addition to the significance of its rivals."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,10 +270,11 @@ class Features:
     Args:
         rivals: features of each rival, shape (r, f).
         runs: features of each run, shape (n, k); the last one is 1 with the wind on, else 0.
-        shifts: of the quantities under each rival, in standard deviations, shape (r, d); 0 where not determined.
-        covariances: of the quantities under each rival, in the same unit, shape (r, d, d).
-        values: of the quantities in the nominal fit, SI, shape (d,).
-        stds: their standard deviations, SI, shape (d,); 1 where not determined.
+        shifts: shifts of the quantities under each rival, in standard deviations, shape (r, d); 0 where not
+            determined.
+        covariances: covariances of the quantities under each rival, in the same unit, shape (r, d, d).
+        values: values of the quantities in the nominal fit, SI, shape (d,).
+        stds: standard deviations of the values, SI, shape (d,); 1 where not determined.
         known: which quantities are determined, shape (d,).
     """
 
@@ -301,28 +302,28 @@ def record_features(runs: Sequence[Demodulated]) -> list[tuple[Features, Rivals]
     ends = 2 * np.cumsum(windows.sizes)
     pairs: list[tuple[Features, Rivals] | None] = []
     for run, a, b in zip(runs, ends - 2 * windows.sizes, ends, strict=True):
-        found = _fit([run], np.concatenate((run.logarithm, run.phase)), nominal[a:b], columns[a:b])
-        if found is None:
+        fitted = _fit([run], np.concatenate((run.logarithm, run.phase)), nominal[a:b], columns[a:b])
+        if fitted is None:
             pairs.append(None)
             continue
-        rate, omega = run.rate + found.parameters[0], run.omega + found.parameters[1]
+        rate, omega = run.rate + fitted.parameters[0], run.omega + fitted.parameters[1]
         natural = float(np.hypot(rate, omega))
         jacobian = np.array([[omega**2, -rate * omega], [rate * natural**2, omega * natural**2]]) / natural**3
-        moved = np.array([[rate, omega]]) + found.shifts
+        moved = np.array([[rate, omega]]) + fitted.shifts
         sizes = np.hypot(moved[:, 0], moved[:, 1])
         moved = np.column_stack((moved[:, 0] / sizes, sizes))
-        own = _run_features(run, found, 0.0, np.zeros(2), 0.0)
-        pairs.append((_features(found, moved, jacobian, np.ones(2, dtype=bool), own[None]), found))
+        own = _run_features(run, fitted, 0.0, np.zeros(2), 0.0)
+        pairs.append((_features(fitted, moved, jacobian, np.ones(2, dtype=bool), own[None]), fitted))
     return pairs
 
 
 def campaign_features(
-    runs: Sequence[Run], seen: Sequence[Demodulated], design: Design, alone: Sequence[Rivals]
+    runs: Sequence[Run], decays: Sequence[Demodulated], design: Design, alone: Sequence[Rivals]
 ) -> Features | None:
-    """Features of a campaign, for Cnβ, Cnr, Izz and Cr; None where the runs do not determine any coefficient."""
+    """Features of a campaign, for Cnβ, Cnr, Izz and Cr; None if the runs do not determine any coefficient."""
     # The windows' own decays are added to their deviations.
     parts, blocks = [], []
-    for decay, link in zip(seen, design.links, strict=True):
+    for decay, link in zip(decays, design.links, strict=True):
         half = decay.time / (2.0 * decay.omega)
         stiffness = decay.omega**2 + decay.rate**2
         parts += [
@@ -331,35 +332,35 @@ def campaign_features(
         ]
         blocks += [np.outer(-decay.time, link[0]), np.outer(half, link[1] - 2.0 * decay.rate * link[0])]
     values, shared = np.concatenate(parts), np.concatenate(blocks)
-    first = _fit(seen, values, shared, np.zeros((values.size, 0)))
+    first = _fit(decays, values, shared, np.zeros((values.size, 0)))
     if first is None:
         return None
     start = derivatives(design, first.parameters)
     air = (start.get("cn_beta") or 0.0, start.get("cn_r") or 0.0)
-    columns = campaign_columns(RivalWindows.of(seen), RivalConditions.of(runs, design, air))
-    found = _fit(seen, values, shared, columns)
-    if found is None or not start.names:
+    columns = campaign_columns(RivalWindows.of(decays), RivalConditions.of(runs, design, air))
+    fitted = _fit(decays, values, shared, columns)
+    if fitted is None or not start.names:
         return None
     known = np.array([name in start.names for name in CAMPAIGN_NAMES])
-    moved = np.zeros((len(found.shifts), len(CAMPAIGN_NAMES)))
-    for place, shift in enumerate(found.shifts):
-        under = derivatives(design, found.parameters + shift)
+    moved = np.zeros((len(fitted.shifts), len(CAMPAIGN_NAMES)))
+    for place, shift in enumerate(fitted.shifts):
+        under = derivatives(design, fitted.parameters + shift)
         if under.names:
             moved[place, known] = under.values
         else:
             moved[place, known] = start.values + start.jacobian @ shift
-            found.valid[place] = False
+            fitted.valid[place] = False
     jacobian = np.zeros((len(CAMPAIGN_NAMES), design.size))
     jacobian[known] = start.jacobian
     fastest = max(run.wind_speed for run in runs)
     rows = []
-    for run, decay, rivals, link in zip(runs, seen, alone, design.links, strict=True):
+    for run, decay, rivals, link in zip(runs, decays, alone, design.links, strict=True):
         own = np.array([decay.rate, decay.omega]) + rivals.parameters
-        rate, stiffness = link @ found.parameters
+        rate, stiffness = link @ fitted.parameters
         gap = own - np.array([rate, np.sqrt(max(stiffness - rate**2, 0.0))])
         away = gap / np.sqrt(np.diag(rivals.covariances[0]))
         rows.append(_run_features(decay, rivals, run.wind_speed / max(fastest, 1e-300), away, 1.0))
-    return _features(found, moved, jacobian, known, np.array(rows))
+    return _features(fitted, moved, jacobian, known, np.array(rows))
 
 
 def _fit(windows: Sequence[Demodulated], values: Array, design: Array, columns: Array) -> Rivals | None:
@@ -377,28 +378,28 @@ def _fit(windows: Sequence[Demodulated], values: Array, design: Array, columns: 
     return fit_rivals(values[:, 0], design, columns, np.concatenate(weights), 2 * len(windows))
 
 
-def _features(found: Rivals, moved: Array, jacobian: Array, known: Mask, runs: Array) -> Features:
-    covariances = jacobian @ found.covariances @ jacobian.T
+def _features(fitted: Rivals, moved: Array, jacobian: Array, known: Mask, runs: Array) -> Features:
+    covariances = jacobian @ fitted.covariances @ jacobian.T
     variances = np.where(known, np.diag(covariances[0]), 1.0)
     stds = np.sqrt(np.maximum(variances, 1e-300))
     shifts = np.where(known, (moved - moved[0]) / stds, 0.0)
     covariances = covariances / np.outer(stds, stds)
     widths = np.sqrt(np.maximum(np.diagonal(covariances, axis1=1, axis2=2), 1e-12))
-    level = np.log(found.remaining / found.freedom + 0.05)
+    level = np.log(fitted.remaining / fitted.freedom + 0.05)
     rivals = np.column_stack(
         (
-            np.arcsinh(found.scores),
-            np.log(found.own + 1e-6),
+            np.arcsinh(fitted.scores),
+            np.log(fitted.own + 1e-6),
             level,
             level - level.min(),
             np.arcsinh(shifts),
             np.where(known, np.log(np.minimum(widths, 1e6)), 0.0),
         )
     )
-    rivals[~found.valid] = 0.0
-    shifts[~found.valid] = 0.0
+    rivals[~fitted.valid] = 0.0
+    shifts[~fitted.valid] = 0.0
     return Features(
-        rivals, runs, shifts, covariances, found.valid, np.where(known, moved[0], 0.0), stds, known
+        rivals, runs, shifts, covariances, fitted.valid, np.where(known, moved[0], 0.0), stds, known
     )
 
 

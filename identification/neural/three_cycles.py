@@ -1,7 +1,7 @@
-"""Windows of three cycles in a record, from its zero crossings alone, each as 100 numbers that depend on ζ alone.
+"""Windows of three cycles in a record, from its zero crossings alone, each as 100 numbers that depend only on ζ.
 
-Every step is linear in the reading once the crossings are known. So each result is a weighted sum of the samples,
-and white noise is propagated through all steps by the delta method.
+Every step is linear in the reading once the crossings are known. Each result is therefore a weighted sum of the
+samples, and white noise is propagated through all steps by the delta method.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Shape:
     """A normalised response.
 
     Args:
-        inputs: the network's, shape (100,).
+        inputs: inputs of the network, shape (100,).
         scale: divisor of the points, the amplitude, in the unit of the points.
         peak_weights: weights of the points in the scale, shape (100,).
     """
@@ -42,8 +42,8 @@ class Shape:
 def normalise(points: Array) -> Shape:
     """Remove the mean, and scale the largest value of the first half cycle to 1.
 
-    The largest value comes from a quartic through the points of the half cycle, less sensitive to noise. The scale
-    is 0 or less where the half cycle does not rise above the mean.
+    The largest value comes from a quartic through the points of the half cycle, which is less sensitive to
+    noise. The scale is 0 or less if the half cycle does not rise above the mean.
 
     Args:
         points: means over the hundredths of three cycles from a zero crossing on, the first half cycle positive,
@@ -58,7 +58,7 @@ def normalise(points: Array) -> Shape:
 
 
 def response_points(zeta: Array) -> Array:
-    """The 100 points of e^{−6πκτ} sin 6πτ (paper, eq. 12) with κ = ζ/√(1 − ζ²), shape (n, 100), of ratios (n,)."""
+    """The 100 points of e^{−6πκτ} sin 6πτ (paper, eq. 12) with κ = ζ/√(1 − ζ²), shape (n, 100), for n ratios."""
     ratio = np.asarray(zeta, dtype=np.float64)[:, None]
     pole = 2.0 * np.pi * CYCLES * (1j - ratio / np.sqrt(1.0 - ratio**2))
     integral = (np.exp(pole * np.linspace(0.0, 1.0, POINTS + 1)) / pole).imag
@@ -89,8 +89,8 @@ _TERMS = 6
 _EXPONENTS = np.arange(_TERMS)[:, None]
 _ROUNDS = 8
 _SETTLED = 1e-10  # of a half cycle
-_CLEAR = 20.0  # amplitude over the noise of a crossing's level for which linear propagation is valid
-_BAND = 4.0  # a crossing counts when the smoothed reading goes this many standard deviations beyond
+_CLEAR = 20.0  # minimum amplitude over the noise of a crossing's level for linear propagation to be valid
+_BAND = 4.0  # a crossing counts when the smoothed reading goes this many standard deviations beyond the level
 _SHARE = 0.004  # or this share of the largest swing
 
 
@@ -99,7 +99,7 @@ class ThreeCycles:
     """One window.
 
     Args:
-        start_s: of the first crossing since the record's first sample, s.
+        start_s: time of the first crossing since the record's first sample, s.
         t3: time of three damped cycles, s.
     """
 
@@ -114,11 +114,11 @@ class Propagation:
     """Propagation of the samples' white noise to the points, the start of the window and t3.
 
     Args:
-        std: of one sample, rad.
+        std: noise of one sample, rad.
         points: weights of the samples in the 100 points, shape (100, n).
         timing: weights of the samples in t0 and t3, s/rad, shape (2, n).
         by_timing: derivatives of the points by t0 and t3, rad/s, shape (100, 2).
-        first: index of the first sample of nonzero weight.
+        first: index of the first sample with a nonzero weight.
     """
 
     std: float
@@ -131,7 +131,7 @@ class Propagation:
         """Errors of ζ and t3 per standard deviation of each sample's noise, shape (2, n), in 1 and s.
 
         Args:
-            gradient: of ζ by the network's inputs, shape (100,).
+            gradient: derivatives of ζ by the network's inputs, shape (100,).
         """
         pulled = (gradient - shape.peak_weights * float(gradient @ shape.inputs)) / shape.scale
         pulled = pulled - pulled.mean()
@@ -171,8 +171,8 @@ def find_windows(record: Record, noise_std: float) -> tuple[tuple[ThreeCycles, .
         noise_std: standard deviation of one sample, rad, above 0.
 
     Returns:
-        The windows, and the number of cycles of clear oscillation from the first crossing on; 0 where nothing
-        oscillates.
+        The windows, and the number of cycles of clear oscillation from the first crossing on; 0 without an
+        oscillation.
     """
     rough = starting_decay(record)
     if rough is None or rough.omega_d == 0.0:
@@ -283,7 +283,8 @@ def _window(trace: _Trace, place: _Place) -> ThreeCycles | None:
     shape = normalise(points)
     first, last = np.searchsorted(trace.time, (instants[0] - place.half, instants[-1] + place.half))
     part = slice(int(first), int(last))
-    level_weights = np.zeros((instants.size, trace.time.size))  # of the samples, in the level at each instant
+    # weights of the samples in the level at each instant
+    level_weights = np.zeros((instants.size, trace.time.size))
     for number, instant in enumerate(instants):
         where, rows = _fit_rows(trace, float(instant), place.half)
         level_weights[number, where] = rows[0]

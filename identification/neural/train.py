@@ -1,4 +1,4 @@
-"""Training of both networks from a seed: of several starts each, the one of largest evidence is chosen.
+"""Training of both networks from a seed: the one of largest evidence among several starts is chosen for each.
 
 Full-batch Levenberg–Marquardt in torch float64, on one thread and in a fixed order: the same start gives identical
 weights on the same machine and version of torch, also after resuming from a checkpoint.
@@ -56,8 +56,8 @@ class Hyperparameters:
     10.1109/ICNN.1997.614194.
 
     Args:
-        alpha: α, of the squared network weights; dimensionless, for scaled quantities.
-        beta: β, of the squared errors; dimensionless, for scaled quantities.
+        alpha: α, weight of the squared network weights; dimensionless, for scaled quantities.
+        beta: β, weight of the squared errors; dimensionless, for scaled quantities.
     """
 
     alpha: float
@@ -121,8 +121,8 @@ def log_evidence(
 
 _FIRST = Hyperparameters(0.01, 1.0)
 _FIRST_DAMPING = 5e-3
-_LARGEST_DAMPING = 1e10  # of β: steps are then of the order of rounding errors
-_SMALLEST_DAMPING = 1e-20  # of β
+_LARGEST_DAMPING = 1e10  # multiple of β: steps are then of the order of rounding errors
+_SMALLEST_DAMPING = 1e-20  # multiple of β
 _FACTOR = 10.0
 _STANDS_OUT = 1e-4  # βλ/α below which the prior determines a direction
 
@@ -159,7 +159,7 @@ class TrainingPairs:
 
     @classmethod
     def of(cls, pairs: tuple[Array, Array], sizes: tuple[int, ...], *, unit_deviation: bool) -> TrainingPairs:
-        """Scale inputs and targets to zero mean, and to unit deviation: inputs only on request."""
+        """Scale inputs and targets to zero mean; to unit deviation, inputs only on request."""
         inputs, output = Scaling.of(pairs[0]), Scaling.of(pairs[1][:, None])
         if not unit_deviation:
             inputs = replace(inputs, deviation=(1.0,) * len(inputs.deviation))
@@ -167,7 +167,7 @@ class TrainingPairs:
 
 
 def first_weights(sizes: tuple[int, ...], rng: np.random.Generator) -> Array:
-    """Random weights of variance one over the number of a unit's inputs, and biases of deviation 0.3."""
+    """Random weights with a variance of one over the number of a unit's inputs, and biases of deviation 0.3."""
     parts = []
     for before, after in pairwise(sizes):
         parts.append(rng.standard_normal(before * after) / np.sqrt(before))
@@ -218,7 +218,7 @@ def outputs_and_jacobian(weights: Tensor, sizes: tuple[int, ...], inputs: Tensor
 
 
 def advance_training(progress: TrainingProgress, problem: TrainingPairs) -> TrainingProgress:
-    """One step of Levenberg–Marquardt, after a re-estimation of α and β; ``finished`` where no step lowers F.
+    """One step of Levenberg–Marquardt, after α and β are re-estimated; ``finished`` if no step lowers F.
 
     It solves (βJᵀJ + (α + μ)I) δ = −(βJᵀe + αw) by the singular values of J, so that γ remains accurate where β is
     large. A step that lowers F is accepted and μ divided by ten; otherwise it is repeated with ten times the μ.
@@ -287,7 +287,8 @@ def conclude_training(progress: TrainingProgress, problem: TrainingPairs) -> tup
 
 
 _LARGEST = 1e20
-"""Largest weight, α, β and μ, and one over the smallest α and β: with these no product of a step overflows."""
+"""Limits of the largest weight, α, β and μ, and of one over α and β, within which no product of a step
+overflows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -346,7 +347,7 @@ class Checkpoint:
 
 
 def read_checkpoint(path: Path, spec: dict[str, Any]) -> Checkpoint | None:
-    """Read the checkpoint of a training; None where it is missing, or belongs to another training."""
+    """Read the checkpoint of a training; None if it is missing, or belongs to another training."""
     return Checkpoint.from_bytes(read_regular(path, limits.WEIGHTS_BYTES), spec) if path.exists() else None
 
 

@@ -1,1 +1,1 @@
-"""The ground of everything that presents: blocks, drawing and its style."""
+"""The ground layer of all presentation: blocks, drawing and its style."""

@@ -1,7 +1,8 @@
 """Results as headings, paragraphs, tables, lists and figures, and the back ends that show these blocks.
 
-A result is turned into blocks once, for every face: `as_text` serves ``print``, `as_notebook` notebooks, `as_html`
-the report and the bench, `as_markdown` pages of text, and ``tunnel_lab.terminal.outputs.show`` terminals.
+A result is turned into blocks once, for every presentation: `as_text` serves ``print``, `as_notebook`
+notebooks, `as_html` the report and the bench, `as_markdown` pages of text, and
+``tunnel_lab.terminal.outputs.show`` terminals.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from itertools import zip_longest
 
 WIDTH = 88
 """Paragraphs are wrapped to this many characters."""
-_WIDE = 3  # columns: on a narrow page each row of a wider table becomes a list
+_WIDE = 3  # maximum number of columns: on a narrow page each row of a wider table becomes a list
 _POWER = re.compile(r"(?<=[\d)])e([+-]\d+)\b")
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -33,7 +34,7 @@ class Paragraph:
     """A paragraph.
 
     Args:
-        label: begins the paragraph, unless a section's title introduces it.
+        label: text at the start of the paragraph, unless a section's title introduces it.
         kind: class of the paragraph on a page, such as ``small``.
     """
 
@@ -47,7 +48,7 @@ class Listing:
     """A list.
 
     Args:
-        title: stands above the list, unless a section's title introduces it.
+        title: text above the list, unless a section's title introduces it.
     """
 
     items: tuple[str, ...]
@@ -79,9 +80,9 @@ class TextTable:
         rows: one text for each column; lines of a cell are separated by line ends.
         right: headings of the right-aligned columns.
         names: headings of the columns of names such as ``coulomb_friction``, which a page shows as words.
-        detail: headings of the columns that only a page has room for.
-        sections: number of first columns that name a section. In a terminal a line separates sections, and where
-            it is too narrow these names stand above the rows of their section.
+        detail: headings of the columns that are shown only on a page.
+        sections: number of first columns that name a section. In a terminal a line separates sections; if the
+            terminal is too narrow, these names stand above the rows of their section.
     """
 
     title: str
@@ -93,7 +94,7 @@ class TextTable:
     sections: int = 0
 
     def without_detail(self) -> TextTable:
-        """The table without the columns of a page."""
+        """The table without the columns that are shown only on a page."""
         kept = [heading not in self.detail for heading in self.columns]
 
         def chosen(row: tuple[str, ...]) -> tuple[str, ...]:
@@ -112,10 +113,10 @@ class Card:
 
 @dataclass(frozen=True)
 class Detail:
-    """Blocks that only a page has room for.
+    """Blocks that are shown only on a page.
 
     Args:
-        title: of a fold that hides the blocks at first; empty: they are shown.
+        title: title of a fold that hides the blocks at first; empty: they are shown.
     """
 
     blocks: tuple[Block, ...]
@@ -131,7 +132,7 @@ class Section:
 
     Args:
         key: the id of the section on a page.
-        title: on a page; other faces show no titles.
+        title: title on a page; other presentations show no titles.
     """
 
     key: str
@@ -200,7 +201,7 @@ def _text_table(table: TextTable) -> str:
     rule = "-" * (sum(widths) + 2 * (len(widths) - 1))
 
     def row_lines(row: Sequence[str]) -> str:
-        """One row, on as many lines as its tallest cell."""
+        """One row, on as many lines as its tallest cell needs."""
         return "\n".join(
             "  ".join(
                 text.rjust(width) if heading in table.right else text.ljust(width)
@@ -216,7 +217,7 @@ def _text_table(table: TextTable) -> str:
 
 
 def as_markdown(blocks: Iterable[Block]) -> str:
-    """Blocks as Markdown without HTML and links in their texts; the name of a figure is its address."""
+    """Blocks as Markdown; their texts have no HTML and no links. The name of a figure is its address."""
     return "\n\n".join(filter(None, map(_markdown, blocks))) + "\n"
 
 
@@ -257,11 +258,11 @@ def as_notebook(blocks: Iterable[Block]) -> str:
 
 
 def as_html(blocks: Iterable[Block], drawn: Mapping[str, str] | None = None, *, titled: bool = False) -> str:
-    """Blocks as HTML; the page's style sheet gives the look.
+    """Blocks as HTML, to be styled by the page's style sheet.
 
     Args:
         drawn: HTML of the figures by name; others are left out.
-        titled: whether the title of a section introduces the blocks, in place of their labels.
+        titled: whether the title of a section introduces the blocks, so that their labels are omitted.
     """
     drawn = drawn or {}
     return "".join(_html(block, drawn, titled) for block in blocks if _filled(block))
@@ -313,7 +314,7 @@ def _html(block: Block, drawn: Mapping[str, str], titled: bool) -> str:
 
 
 def _html_table(table: TextTable) -> str:
-    """Each cell has its heading, for narrow pages that stack the cells of a row."""
+    """A table as HTML; each cell has its heading, for narrow pages that stack the cells of a row."""
     numeric = [' class="n"' if heading in table.right else "" for heading in table.columns]
     named = [heading in table.names for heading in table.columns]
     heads = zip(numeric, table.columns, strict=True)

@@ -32,7 +32,8 @@ NARROW = 4.4  # inches: legible on a phone without scrolling
 SIGMAS = 3.0
 """Standard deviations within which values count as noise in the figures."""
 _FAINTEST = 0.12
-_STEPS = 48  # of a colour map: too fine to be visible; a colour bar has the same number of areas
+# number of levels of a colour map: too fine to be visible; a colour bar has the same number of areas
+_STEPS = 48
 _NOT_HTML = (
     re.compile(r"^.*?(?=<svg)", re.DOTALL),  # the XML declaration and document type, which contain an address
     re.compile(r"<metadata>.*?</metadata>\s*", re.DOTALL),
@@ -47,10 +48,10 @@ _REFERENCE = re.compile(r'(href="#|url\(#)([^")]+)')
 
 
 def in_words(drawn: Figure, freedom: Freedom, names: Sequence[str]) -> Figure:
-    """A drawing whose texts are in the words of a freedom.
+    """A drawing with its texts in the words of a freedom.
 
     Args:
-        names: of the user's, which are kept.
+        names: the user's names, which are not translated.
     """
     if freedom is ANGLE:
         return drawn
@@ -71,7 +72,7 @@ def array(values: Sequence[float | None]) -> Array:
 
 
 def faded(*colours: str) -> Colormap:
-    """A colour map that fades out instead of becoming white, which suits light and dark pages.
+    """A colour map that fades out instead of becoming white, for light and dark pages.
 
     It has one colour, from faint to opaque, or two, opaque at the ends and transparent in the middle.
     """
@@ -89,7 +90,7 @@ def faded(*colours: str) -> Colormap:
 def colour_bar(figure: Figure, shown: ScalarMappable, axes: Axes, **given: Any) -> None:
     """A colour bar of separate areas in the colours of the page's theme; arguments of ``Figure.colorbar``."""
     bar = figure.colorbar(shown, ax=axes, **given)
-    if bar.solids is not None:  # otherwise an image, in the colours of the light page
+    if bar.solids is not None:  # otherwise it is an image, in the colours of the light page
         bar.solids.set_rasterized(False)
 
 
@@ -99,7 +100,7 @@ def inline_svg(figure: Figure, name: str, description: str) -> str:
 
     Args:
         figure: drawn by matplotlib; its text remains text. Colours of `THEMED` become the style sheet's.
-        name: unique in the page; the prefix of every id in the element.
+        name: a name that is unique in the page; the prefix of every id in the element.
     """
     from matplotlib import rc_context
 

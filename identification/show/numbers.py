@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from tunnel_sim.vocabulary.quantities import Share
 
 FIXED_DECIMALS = 9
-"""A number with more decimals than this, above a million or below a ten-thousandth has a power of ten."""
+"""A number with more decimals than this, above a million or below a ten-thousandth is shown with a power of
+ten."""
 
 
 NEGLIGIBLE = 1e-9
@@ -58,7 +59,7 @@ def with_std(value: float, std: float | None) -> str:
 
     Args:
         value: the estimate, any unit.
-        std: its standard deviation, in the same unit; None where it is not known.
+        std: standard deviation, in the same unit; None if not known.
     """
     special = _special(value, std)
     if special or std is None:
@@ -87,11 +88,11 @@ def concise(value: float, std: float | None) -> str:
 
 
 def in_stds(error: float, std: float | None) -> str:
-    """An error in standard deviations, such as ``+0.8 σ``; ``–`` where the standard deviation is not known.
+    """An error in standard deviations, such as ``+0.8 σ``; ``–`` if the standard deviation is not known.
 
     Args:
         error: estimate − truth, any unit.
-        std: standard deviation of the estimate, in the same unit; None where it is not known.
+        std: standard deviation of the estimate, in the same unit; None if not known.
     """
     if std is None or not math.isfinite(std) or std <= 0.0:
         return "–"
@@ -105,7 +106,7 @@ def unit(text: str) -> str:
 
 
 def _special(value: float, std: float | None) -> str:
-    """The text of a value that cannot be rounded by its standard deviation; empty for others."""
+    """The text of a value that its standard deviation cannot round; empty for other values."""
     if not math.isfinite(value):
         return "not finite"
     if std is None or not math.isfinite(std):
@@ -171,12 +172,12 @@ def probability(value: float) -> str:
 
 
 def for_people(value: float, std: float | None, unit: str) -> str:
-    """A value to three digits, with its standard deviation where they show it, such as ``1.96 ± 0.12 %``.
+    """A value to three digits, with its standard deviation if these digits show it, such as ``1.96 ± 0.12 %``.
 
     Args:
         value: in the unit; radians are shown in degrees.
-        std: its standard deviation, in the same unit; None: not known.
-        unit: as effects and documents write it.
+        std: standard deviation, in the same unit; None: not known.
+        unit: unit in the spelling of effects and documents.
     """
     if unit in _MOTIONS:
         mark, factor = unit_shown(unit)
@@ -207,7 +208,7 @@ def share(value: float) -> str:
     """A share in per cent, never rounded to 0 or 100 %: text such as ``98.2 %`` or ``> 99.9 %``.
 
     Args:
-        value: a fraction; ``none`` below 0, where the residual has grown.
+        value: a fraction; below 0, where the residual has grown, the text is ``none``.
     """
     if value < 0.0:
         return "none"
@@ -222,7 +223,7 @@ def percent(share: Share, std: float | None = None) -> str:
     """A share in per cent, such as ``94.2 ± 0.6 %``.
 
     Args:
-        std: its standard deviation, a fraction.
+        std: standard deviation, a fraction.
     """
     beside = "" if std is None else f" ± {max(100.0 * std, 0.1):.1f}"
     return f"{min(100.0 * share, 100.0):.1f}{beside} %"
@@ -232,7 +233,7 @@ _UNITS = {"l/V": "the time in which the air passes the reference length"}
 
 
 def explained(units: Iterable[str]) -> str:
-    """Explanation of units that only this field uses, in brackets after a blank; empty where all are common."""
+    """Explanation, in brackets after a blank, of units that only this field uses; empty if all are common."""
     said = [f"{unit}: {_UNITS[unit]}" for unit in units if unit in _UNITS]
     return f" ({'; '.join(said)})" if said else ""
 
@@ -251,7 +252,7 @@ def rounded_up(value: float) -> str:
 
 
 def relative_change(before: float, after: float) -> Share:
-    """The change of a coefficient's size by the causes, of its size without them: the base of every such change.
+    """The relative change of a coefficient by the causes; the reference is its value without them.
 
     Args:
         before: the value without the causes, not 0, in its unit.
@@ -261,7 +262,7 @@ def relative_change(before: float, after: float) -> Share:
 
 
 def size_change(before: float, after: float) -> str:
-    """How the size of a coefficient changes, such as ``-6.6 %``: a negative one that comes nearer to zero falls.
+    """The change of a coefficient's size, such as ``-6.6 %``: negative if the coefficient comes nearer to zero.
 
     Args:
         before: the value without the causes, not 0, in its unit.
@@ -290,7 +291,7 @@ def within(reach: Share) -> str:
 
 
 def change_up_to(size: float, given: Quantity) -> str:
-    """A change of a coefficient as its share, rounded up; in its unit where the coefficient is uncertain.
+    """An upper limit on a coefficient's relative change; in its unit if the coefficient is uncertain.
 
     Args:
         size: the change, in the coefficient's unit.
@@ -307,12 +308,12 @@ def unit_shown(unit: str) -> tuple[str, float]:
 
 
 def motion_shown(unit: str) -> tuple[str, float]:
-    """The same of the motion itself, an angle or a displacement, where readings have a unit."""
+    """The mark of the motion's displayed unit (angle or displacement) and the factor, for readings of a unit."""
     return next(iter(freedom_of_unit(unit).shown.values()))
 
 
 def joined_mark(mark: str) -> str:
-    """The mark of a unit behind a number, with a blank before it where it needs one."""
+    """The mark of a unit after a number, with a blank before it if it needs one."""
     return mark if mark == "°" else f" {mark}"
 
 
@@ -320,7 +321,7 @@ def beside_noise(excess: float) -> str:
     """A residual in multiples of the noise, root mean square, such as ``0.999 times the noise``.
 
     Args:
-        excess: its mean square over the noise variance, minus one, a ratio.
+        excess: mean square of the residual over the noise variance, minus one, a ratio.
     """
     return f"{significant(math.sqrt(max(1.0 + excess, 0.0)), 3)} times the noise"
 
@@ -337,7 +338,7 @@ def reading_shown(value: float, digits: int, unit: str = "rad") -> str:
 
 
 def held_out_excess(value: float) -> str:
-    """An excess in noise variances, a ratio: three decimals where it is small, or four significant digits."""
+    """An excess in noise variances, a ratio: with three decimals if small, else with four significant digits."""
     return f"{round(value, 3) + 0.0:.3f}" if abs(value) < 10.0 else significant(value, 4)
 
 
@@ -385,7 +386,7 @@ def percent_of(value: Share, digits: int = 2, *, sign: bool = False) -> str:
 
     Args:
         digits: significant ones (a count).
-        sign: whether a plus sign is written.
+        sign: whether to write a plus sign.
     """
     text = significant(100.0 * abs(value), digits) if value else "0"
     return f"{'−' if value < 0.0 else '+' if sign else ''}{text} %"

@@ -16,7 +16,7 @@ _FINITE: ConfigDict = {"allow_inf_nan": False}
 
 
 class AsNumber:
-    """A value that is taken as a number: by ``float`` and by NumPy."""
+    """A value that can be used as a number: by ``float`` and by NumPy."""
 
     value: float
 
@@ -34,16 +34,17 @@ class AsNumber:
 
 @dataclass(frozen=True)
 class Quantity(AsNumber):
-    """A value with its standard deviation and unit; ``float`` and NumPy take it as its value.
+    """A value with its standard deviation and unit; ``float`` and NumPy use its value.
 
     Args:
         value: estimate, in ``unit``.
-        std: standard deviation, in ``unit``; 0 where the value was given, not fitted; None where it is not known.
-        unit: of both, SI, e.g. ``rad/s``; ``1`` where there is none.
-        interval: ends of the central interval of 0.95, in ``unit``, where it is not value ± 1.96 std; else None.
-        bound: ``lower`` or ``upper`` where the fit ended at that end of the allowed range; ``std`` is then None.
+        std: standard deviation, in ``unit``; 0 for a value that was given, not fitted; None if not known.
+        unit: unit of both, SI, e.g. ``rad/s``; ``1`` if dimensionless.
+        interval: ends of the central interval of 0.95, in ``unit``, if it differs from value ± 1.96 std; else
+            None.
+        bound: ``lower`` or ``upper`` if the fit ended at that end of the allowed range; ``std`` is then None.
         determined: whether the runs determine it; if not, ``value`` is meaningless and ``std`` is None.
-        shares: of ``std`` squared by source, fractions; empty where they are not known.
+        shares: shares of ``std`` squared by source, fractions; empty if not known.
     """
 
     __pydantic_config__ = _FINITE
@@ -58,7 +59,7 @@ class Quantity(AsNumber):
 
     @property
     def ends(self) -> tuple[float, float]:
-        """The ends of the 95 % interval, in ``unit``; both the value where its deviation is not known."""
+        """The ends of the 95 % interval, in ``unit``; both the value if its standard deviation is not known."""
         reach = INTERVAL * (self.std or 0.0)
         return self.interval or (self.value - reach, self.value + reach)
 
@@ -75,17 +76,17 @@ class Quantity(AsNumber):
 
     @property
     def known_std(self) -> float:
-        """The standard deviation that every quantity of an `Estimate` has, in ``unit``.
+        """The standard deviation, in ``unit``; every quantity of an `Estimate` has one.
 
         Raises:
-            ValueError: where it is not known, as of a coefficient that a diagnosis does not determine.
+            ValueError: when it is not known, as for a coefficient that a diagnosis does not determine.
         """
         if self.std is None:
             raise ValueError(f"internal error: {self} has no standard deviation")
         return self.std
 
     def to_json_dict(self) -> dict[str, Any]:
-        """Value, std, unit; shares, interval and bound where there are any, ``determined`` where it is false."""
+        """Value, std, unit; shares, interval and bound if there are any; ``determined`` if it is false."""
         data: dict[str, Any] = {"value": self.value, "std": self.std, "unit": self.unit}
         if self.shares and self.std is not None:
             data["shares"] = dict(self.shares)

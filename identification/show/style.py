@@ -29,7 +29,7 @@ WIDTH = 7.2
 _FEW_DECADES = 2.5
 _STEPS = ((1.0, 1.5, 2.0, 3.0, 5.0, 7.0), (1.0, 2.0, 5.0), (1.0, 3.0), (1.0,))
 _DIGIT, _POWER = 0.075, 0.24  # inches: a digit of a label, and a label such as 10² with the gap after it
-_WIDE = 5.0  # times the median standard deviation
+_WIDE = 5.0  # multiple of the median standard deviation
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -48,7 +48,7 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "h")
 
 
 _STYLE = RLock()
-"""A style is a state of the process, which threads of the bench must not change under each other."""
+"""The lock of matplotlib's style, a state of the process that two threads of the bench must not change at once."""
 
 
 def styled(draw: Callable[P, R]) -> Callable[P, R]:
@@ -83,7 +83,7 @@ def _laid_out_once() -> type[Figure]:
 
     class LaidOutOnce(Figure):
         def draw(self, renderer: RendererBase) -> None:
-            """Only lay out where ``savefig`` draws for the layout: it then draws again, without this engine."""
+            """Compute the layout only for ``savefig``, which then draws again without this engine."""
             engine = self.get_layout_engine()
             if isinstance(engine, ConstrainedLayoutEngine) and self.canvas.is_saving():
                 engine.execute(self)
@@ -117,8 +117,8 @@ def log_axis(axes: Axes, which: Literal["x", "y"], room: float = inf) -> None:
     On a short axis Matplotlib also labels ticks between the powers of ten, such as 6×10⁰.
 
     Args:
-        axes: with their data already drawn, because the labels depend on the limits.
-        room: length of a horizontal axis, inches, if it may be too short for the labels.
+        axes: axes with their data already drawn, because the labels depend on the limits.
+        room: length of a horizontal axis, inches, if the axis may be too short for the labels.
     """
     from matplotlib.ticker import FuncFormatter, LogFormatterSciNotation, LogLocator, NullFormatter
 
@@ -150,8 +150,8 @@ def _fit(steps: Sequence[float], limits: tuple[float, float], room: float) -> bo
 
     Args:
         steps: labelled multiples of every power of ten.
-        limits: of the axis, above 0, in its unit.
-        room: its length, inches.
+        limits: limits of the axis, above 0, in its unit.
+        room: length of the axis, inches.
     """
     low, high = log10(min(limits)), log10(max(limits))
     exponents = range(floor(low), ceil(high) + 1)
@@ -171,8 +171,8 @@ def limit_to_known(axes: Axes, values: Array, stds: Array) -> None:
     Their intervals extend beyond the axis.
 
     Args:
-        values: shape (n,), in the axis' unit; NaN where there is none.
-        stds: their standard deviations, shape (n,), in the same unit.
+        values: values, shape (n,), in the axis' unit; NaN for a missing value.
+        stds: standard deviations, shape (n,), in the same unit.
     """
     known_at_all = np.isfinite(values) & np.isfinite(stds)
     if not known_at_all.any():
@@ -191,7 +191,8 @@ def with_breaks(time: Array, *readings: Array) -> tuple[Array, ...]:
         readings: at these times, shape (n,) each.
 
     Returns:
-        The time and the readings, shape (m,) each, with a time in the middle of every gap whose readings are NaN.
+        The time and the readings, shape (m,) each; in the middle of every gap they have a time with readings of
+        NaN.
     """
     after = np.flatnonzero(gaps(time)) + 1
     middles = 0.5 * (time[after - 1] + time[after])

@@ -1,1 +1,1 @@
-"""One free-decay record: its motion, noise, frequency, filter and windows, and what can be fitted to it."""
+"""One free-decay record: its motion, noise, frequency, filter and windows, and the models fitted to it."""

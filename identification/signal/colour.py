@@ -1,8 +1,8 @@
 """Coloured noise of the sensor: its spectrum between the harmonics of the motion, as an autoregression.
 
-The misfit of a model is concentrated at the frequency of the motion and its harmonics. The spectrum of a residual
-between them is therefore the noise's, whatever the model, and noise of a smooth spectrum has the power at the
-harmonics that its neighbours show. An autoregression of that spectrum gives the power of the noise at any
+The misfit of a model is concentrated at the frequency of the motion and its harmonics. Between them the
+spectrum of a residual is therefore the noise's, whatever the model, and noise with a smooth spectrum has
+similar power at the harmonics. An autoregression fitted to that spectrum gives the power of the noise at any
 frequency, and it whitens the residual, so that one test of the model serves white and coloured noise. `tunnel
 diagnose` takes its spectra from the same ordinates and whitens by the same recursion.
 """
@@ -23,14 +23,14 @@ from tunnel_sim.vocabulary.quantities import Angles, Seconds, Vector
 from tunnel_sim.vocabulary.record import Array
 
 HANN = 1.94
-"""Neighbouring ordinates under a Hann window that carry the information of one independent ordinate."""
+"""Number of neighbouring ordinates under a Hann window that carry the information of one independent ordinate."""
 CYCLES = 8.0
-"""Least number of cycles in a periodogram: the windowed line of the motion stays within the excluded share."""
+"""Minimum number of cycles in a periodogram: the windowed line of the motion stays within the excluded share."""
 LOWEST = 2.5
-"""Cycles in a record: the window's lobe about zero frequency ends there."""
-_BESIDE = 0.25  # of the motion's frequency, excluded on either side of its harmonics
-_IN_CYCLE = 32.0  # least number of values in a cycle of the motion, where the samples are as many
-_FASTEST = 0.375  # of the sample rate: above it, no ordinates lie between the motion and half the rate
+"""Frequency, in cycles per record, at which the window's lobe about zero frequency ends."""
+_BESIDE = 0.25  # share of the motion's frequency that is excluded on either side of its harmonics
+_IN_CYCLE = 32.0  # minimum number of values in a cycle of the motion, if the record has as many samples
+_FASTEST = 0.375  # share of the sample rate above which no ordinates lie between the motion and half the rate
 _HIGHEST_ORDER = 40
 _VALUES_PER_TAP = 10.0
 
@@ -55,9 +55,9 @@ class Periodogram:
 
         Args:
             values: the residual, shape (n,).
-            interval: between the values.
+            interval: interval between the values.
             own: frequency of the motion, in cycles per unit of the interval.
-            variance: of white noise of power 1, in the squared unit of the values.
+            variance: variance of white noise of power 1, in the squared unit of the values.
         """
         window = np.hanning(values.size)
         scale = variance * float(window @ window)
@@ -74,7 +74,7 @@ class Periodogram:
         """Mean power and number of independent ordinates between the harmonics by band, shape (bands,) each.
 
         Args:
-            edges: of the bands, ascending, shape (bands + 1,).
+            edges: edges of the bands, ascending, shape (bands + 1,).
         """
         band = np.searchsorted(edges, self.frequency[self.between], side="right") - 1
         inside = (band >= 0) & (band < edges.size - 1)
@@ -101,10 +101,10 @@ class Periodogram:
 def levinson(covariance: Vector) -> Iterator[tuple[Array, float]]:
     """Whitening filters of rising order and the variances of their innovations, from an autocovariance.
 
-    S. M. Kay, Modern Spectral Estimation (1988), sect. 6.3. The first is for white noise.
+    S. M. Kay, Modern Spectral Estimation (1988), sect. 6.3. The first filter is for white noise.
 
     Args:
-        covariance: at lags from zero on, shape (n,).
+        covariance: autocovariance at lags from zero on, shape (n,).
 
     Yields:
         The filter, its first tap 1, shape (order + 1,), and the variance, for orders below n.
@@ -122,8 +122,8 @@ def levinson(covariance: Vector) -> Iterator[tuple[Array, float]]:
 def steady(power: Array, count: Array, rate: float) -> NDArray[np.bool_]:
     """The bands with one level in all parts, by a likelihood ratio of gamma variables; shape (bands,).
 
-    A steady band fails at a ``rate``. Bartlett's correction makes the statistic nearly χ² for few ordinates (Proc.
-    R. Soc. A 160 (1937) 268, doi 10.1098/rspa.1937.0109).
+    A steady band fails at the false-alarm rate ``rate``. Bartlett's correction makes the statistic nearly χ²
+    for few ordinates (Proc. R. Soc. A 160 (1937) 268, doi 10.1098/rspa.1937.0109).
 
     Args:
         power: mean power by part and band, shape (parts, bands).
@@ -141,15 +141,15 @@ def steady(power: Array, count: Array, rate: float) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True, eq=False)
 class Autoregression:
-    """Coloured noise of a run: a filter makes it of white noise. Frequencies are multiples of the motion's.
+    """Coloured noise of a run as filtered white noise. Frequencies are multiples of the motion's.
 
     Args:
-        whitening: from values to innovations, its first tap 1, shape (order + 1,).
-        innovations: their variance, rad².
-        covariance: of the values, at lags from 0 to the order, shape (order + 1,), rad².
-        count: values behind the estimate.
-        block: samples in the mean that is a value, times the root of its size.
-        cycle: values in a cycle of the motion.
+        whitening: filter from values to innovations, its first tap 1, shape (order + 1,).
+        innovations: variance of the innovations, rad².
+        covariance: autocovariance of the values, at lags from 0 to the order, shape (order + 1,), rad².
+        count: number of values behind the estimate.
+        block: number of samples whose mean, times the root of this number, is a value.
+        cycle: number of values in a cycle of the motion.
     """
 
     whitening: Array
@@ -164,14 +164,14 @@ class Autoregression:
         """The noise in the residual of a run.
 
         The order has the least −2 ln L + 2p (H. Akaike, IEEE Trans. Automat. Contr. 19 (1974) 716, doi
-        10.1109/TAC.1974.1100705). Means of blocks keep it low where samples are many in a cycle.
+        10.1109/TAC.1974.1100705). If a cycle has many samples, means of blocks keep the order low.
 
         Args:
-            residual: evenly spaced, shape (n,), rad.
-            cycle: samples in a cycle of the motion.
+            residual: evenly spaced residual, shape (n,), rad.
+            cycle: number of samples in a cycle of the motion.
 
         Returns:
-            The noise; None where the record is too short to tell it from the misfit of a model.
+            The noise; None if the record is too short to distinguish it from the misfit of a model.
         """
         block = max(1, int(cycle / _IN_CYCLE))
         values, own = slow_part(residual, block), block / cycle
@@ -190,7 +190,7 @@ class Autoregression:
         return best
 
     def power(self, frequency: Array | float) -> Array:
-        """Power, rad², any shape: white noise has the variance of one sample at all frequencies."""
+        """Power of the noise, rad², any shape: white noise has the variance of one sample at all frequencies."""
         turns = self._turns(frequency)
         averaged = np.sinc(np.asarray(frequency) / self.cycle)  # the response of the means of blocks
         return np.asarray(self.innovations / np.abs(turns @ self.whitening * averaged) ** 2)
@@ -208,7 +208,7 @@ class Autoregression:
         return float(2.0 * self.count / (2.0 + self.innovations * spread))
 
     def near_motion(self, residual: Angles) -> tuple[float, float]:
-        """Power within a quarter of the motion's frequency, over the noise's.
+        """Power of a residual within a quarter of the motion's frequency, over the noise's.
 
         Returns:
             The sum of independent squares, which have a mean of 1 in noise alone, and their number.
@@ -223,7 +223,7 @@ class Autoregression:
     def whitened(self, residual: Angles) -> Array:
         """The innovations in a residual over their standard deviations, dimensionless.
 
-        The first values have fewer before them, and filters of lower order predict them.
+        Earlier values are too few for the first ones; filters of lower order predict them.
         """
         values, order = slow_part(residual, self.block), self.whitening.size - 1
         later = np.convolve(values, self.whitening, mode="valid") / sqrt(self.innovations)
@@ -244,7 +244,7 @@ class Autoregression:
 
 
 def slow_part(values: Angles, block: int) -> Array:
-    """Means over blocks, times the root of their size: of white noise, with the variance of one value.
+    """Means over blocks, times the root of their size; for white noise they have the variance of one value.
 
     Args:
         block: number of values in a block.

@@ -1,4 +1,4 @@
-"""Least squares of motions: variable projection, one run or many with shared parameters, free and driven ones.
+"""Least squares of motions by variable projection: one run or many with shared parameters, free and driven.
 
 Every run i has (aᵢ, kᵢ, gᵢ) = Lᵢ φ + cᵢ, with the gain gᵢ of its input (`identification.signal.forcing`). The
 initial angle and rate and the sensor's zero enter linearly, so they are eliminated in closed form and only φ is
@@ -27,8 +27,8 @@ from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.quantities import Angles, Gain, PerParameter, Vector
 from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced, read_only
 
-_ZERO_FIRST = np.ix_([4, 0, 1], [4, 0, 1])  # of the rows: the zero, unit angle, unit rate
-_TOLERANCE = 1e-12  # relative step of k, and of a in units of ωn, at which the iteration ends
+_ZERO_FIRST = np.ix_([4, 0, 1], [4, 0, 1])  # order of the rows: the zero, unit angle, unit rate
+_TOLERANCE = 1e-12  # relative step of k, and step of a in units of ωn, at which the iteration ends
 _ROUNDING = 1e-9  # a step this small that no longer lowers the cost is limited by rounding
 _MAX_ITERATIONS = 100
 # Where the model fits badly, Gauss–Newton converges slowly. At the last iteration a fall of the cost by less than
@@ -41,7 +41,7 @@ class Reading:
     """A stretch of one record, with its clock set to zero at the first sample.
 
     Args:
-        time: since the first sample, shape (n,), s.
+        time: time since the first sample, shape (n,), s.
         yaw: sensor reading, shape (n,), rad.
     """
 
@@ -59,12 +59,12 @@ class Reading:
         return replace(cls.from_record(run.record), forcing=forcing_of(run, derivative))
 
     def residual(self, state: RunUnknowns, rows: Rows) -> Angles:
-        """Reading less model; ``rows`` are the forcing's at the decay."""
+        """Reading less model; ``rows`` are the rows of the forcing at the decay."""
         free = self.forcing.freed(self.yaw, rows, state.gain)
         return np.asarray(free - state.zero * rows[4] - state.angle * rows[0] - state.rate * rows[1])
 
     def freed(self, decay: Decay, gain: Gain) -> Reading:
-        """The reading less the response to the input: a free decay."""
+        """The reading less the response to the input, which is a free decay."""
         rows = self.forcing.rows(self.time, decay)
         return Reading(self.time, self.forcing.freed(self.yaw, rows, gain))
 
@@ -79,8 +79,8 @@ class DecayFit:
     """Runs fitted together.
 
     Args:
-        zero: the sensor's zero, rad; the mean where every run has its own.
-        normal: information of φ, and of the zero last where it was estimated, shape (p, p) or (p + 1, p + 1).
+        zero: the sensor's zero, rad; the mean if every run has its own.
+        normal: information on φ, and last on the zero if it was estimated, shape (p, p) or (p + 1, p + 1).
     """
 
     parameters: PerParameter
@@ -95,7 +95,7 @@ class SharedPrior:
     """Prior of the shared parameters, a normal distribution.
 
     Args:
-        mean: of φ, shape (p,).
+        mean: mean of φ, shape (p,).
         information: inverse covariance of φ times the noise variance of the readings, shape (p, p): the weight of
             the prior against one squared residual.
     """
@@ -119,21 +119,21 @@ def fit_decays(
     prior: SharedPrior | None = None,
     tolerance: float = _TOLERANCE,
 ) -> DecayFit:
-    """Fit runs whose decay rate, stiffness and gain are linear in shared parameters.
+    """Fit runs with a decay rate, stiffness and gain that are linear in shared parameters.
 
     Args:
-        links: one matrix Lᵢ per run, shape (3, p), or (2, p) for a free decay: (aᵢ, kᵢ, gᵢ) = Lᵢ φ + cᵢ, where cᵢ
-            is the part of the gain that depends on no unknown.
-        start: φ to start from, shape (p,).
-        zero: the sensor's zero where it is known, rad; None: estimated.
-        own_zeros: whether each run has its own estimated zero; otherwise it is common to the runs. Needed where a
+        links: one matrix Lᵢ per run, shape (3, p), or (2, p) for a free decay: (aᵢ, kᵢ, gᵢ) = Lᵢ φ + cᵢ, where
+            cᵢ is the known part of the gain.
+        start: starting values of φ, shape (p,).
+        zero: the sensor's zero, rad, if known; None: estimated.
+        own_zeros: whether each run has its own estimated zero; otherwise it is common to the runs. Needed if a
             run has no spring.
         prior: the fit then maximises the posterior, and ``normal`` includes the information of the prior.
         tolerance: step of k as a ratio, and of a in units of ωn, at which the iteration ends.
 
     Returns:
-        The fit. ``converged`` is False where the iteration stalled: the values are then the best found, and
-        ``runs`` is empty where even the start was out of range or contained no motion.
+        The fit. ``converged`` is False if the iteration stalled: the values are then the best found, and
+        ``runs`` is empty if even the start was out of range or contained no motion.
     """
     kind: ZeroKind = "known" if zero is not None else "own" if own_zeros else "shared"
     best = _project(readings, links, np.asarray(start, dtype=np.float64), kind, zero, prior)
@@ -198,7 +198,7 @@ def project_run(reading: Reading, decay: Decay) -> tuple[RunFit, float] | None:
     """The best initial state and zero of a free decay for given parameters, such as another method's.
 
     Returns:
-        The run at that decay and its sensor zero in rad; None where the decay overflows.
+        The run at that decay and its sensor zero in rad; None if the decay overflows.
     """
     point = _project([reading], [np.eye(2)], np.array([decay.rate, decay.stiffness]), "shared")
     return (point.runs[0], point.zero) if point.runs else None
@@ -220,7 +220,7 @@ def linearised_at(
     """JᵀJ of one free run in the local order, shape (5, 5), and the score Jᵀ residual, shape (5,).
 
     Args:
-        time: since the initial state, shape (n,), s.
+        time: time since the initial state, shape (n,), s.
         angle: initial angle, rad.
         rate: initial rate, rad/s.
         residual: reading less model, shape (n,), rad.
@@ -235,9 +235,9 @@ def run_at(
     """A run linearised about a state.
 
     Args:
-        rows: of its forcing, whitened where the noise is not white, shape (m, n).
+        rows: rows of the forcing, whitened if the noise is not white, shape (m, n).
         residual: reading less model, shape (n,), rad.
-        gram: products of the rows where they are known, shape (m, m).
+        gram: products of the rows if known, shape (m, m).
     """
     weights = forcing.weights(state)
     return RunFit(
@@ -311,7 +311,7 @@ def _common_zero(grams: Sequence[Array], moments: Sequence[Array]) -> float:
         information, score = eliminate(gram[_ZERO_FIRST], moment[[4, 0, 1]], 1)
         denominator += float(information[0, 0])
         numerator += float(score[0])
-    if not denominator > 0.0:  # motions so slow that they cannot be separated from the zero
+    if not denominator > 0.0:  # motions too slow to be separated from the zero
         raise np.linalg.LinAlgError("the zero cannot be distinguished from the motion")
     return numerator / denominator
 
@@ -326,7 +326,7 @@ def shared_system(
     """Information, shape (m, m), and score, shape (m,), of shared parameters φ, shape (p,), and a shared zero last.
 
     Args:
-        links: from φ to the coefficients, as in `fit_decays`.
+        links: links from φ to the coefficients, as in `fit_decays`.
     """
     normal: Array | float = 0.0
     gradient: Array | float = 0.0
@@ -355,7 +355,7 @@ def block_means(reading: Reading, frequency: float, per_cycle: float) -> tuple[R
     The means keep the rate and frequency of a decay and reduce its amplitude a little.
 
     Args:
-        frequency: of its oscillation, Hz.
+        frequency: frequency of the oscillation, Hz.
         per_cycle: least number of blocks per period; the record itself gives at least eight.
     """
     rate = (reading.time.size - 1) / float(reading.time[-1])

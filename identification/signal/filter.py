@@ -1,14 +1,15 @@
 """A decay driven by a random moment: its likelihood by a steady Kalman filter, and its maximum.
 
-State (β, β̇) with β̈ + 2aβ̇ + kβ = w(t); w is white with ⟨w(t)w(t′)⟩ = q δ(t − t′), or of corner frequency fb, ẇ
-= −2πfb (w − white), with the same q at low frequency; the reading adds white noise of variance R. In discrete
-time the reading obeys D(z) y = C(z) e: D is the characteristic polynomial of the motion, and C and the variance
-of the innovations e follow by spectral factorisation of R D(z)D(1/z) + γ(z), γ the covariance of the driven part.
-So innovations need one call of a recursive filter over the record, and no loop in Python.
+The state is (β, β̇) with β̈ + 2aβ̇ + kβ = w(t). w is white with ⟨w(t)w(t′)⟩ = q δ(t − t′), or has a corner
+frequency fb, ẇ = −2πfb (w − white), with the same q at low frequency. The reading adds white noise of variance
+R. In discrete time the reading obeys D(z) y = C(z) e: D is the characteristic polynomial of the motion; C and
+the variance of the innovations e follow by spectral factorisation of R D(z)D(1/z) + γ(z), where γ is the
+covariance of the driven part. Innovations therefore need one call of a recursive filter over the record, and no
+loop in Python.
 
 The initial state and the sensor's zero enter linearly: their responses are filtered like the reading and fitted
-to it by least squares. The steady filter's assumed covariance of the initial state then has no influence.
-Where q is 0, C is D and the innovations are output error's residual. Sources: Maine & Iliff, SIAM J. Appl. Math.
+to it by least squares. The steady filter's assumed covariance of the initial state then has no influence. Where
+q is 0, C is D and the innovations are the residual of output error. Sources: Maine & Iliff, SIAM J. Appl. Math.
 41 (1981) 558–579, doi 10.1137/0141046 (also the scoring); Åström, Automatica 16 (1980) 551–574, doi
 10.1016/0005-1098(80)90078-3; Jategaonkar, Flight Vehicle System Identification, 2nd ed. (2015), ch. 5.
 """
@@ -28,8 +29,8 @@ from tunnel_sim.vocabulary.input_kinds import KnownGain
 from tunnel_sim.vocabulary.quantities import Angles
 from tunnel_sim.vocabulary.record import Array
 
-_GREATEST = 1e60  # of a growth or a variance over one interval: beyond it no filter is made
-_DOUBLINGS = 30  # of the Riccati equation: 2^30 steps of the filter
+_GREATEST = 1e60  # maximum growth or variance over one interval: beyond it no filter is made
+_DOUBLINGS = 30  # doublings of the Riccati equation: 2^30 steps of the filter
 
 
 def discretised(dynamics: Array, drive: Array, interval: float | Array) -> tuple[Array, Array]:
@@ -39,9 +40,9 @@ def discretised(dynamics: Array, drive: Array, interval: float | Array) -> tuple
     10.1109/TAC.1978.1101743.
 
     Args:
-        dynamics: of the state, shape (n, n) or (systems, n, n), 1/s in SI units of the state.
+        dynamics: matrix of the state, shape (n, n) or (systems, n, n), 1/s in SI units of the state.
         drive: spectral intensity of the noise on the state, of the same shape, in SI units squared per s.
-        interval: s; shape (systems,) for many.
+        interval: sample interval, s; shape (systems,) for many.
     """
     size = dynamics.shape[-1]
     block = np.zeros((*dynamics.shape[:-2], 2 * size, 2 * size))
@@ -56,16 +57,16 @@ def discretised(dynamics: Array, drive: Array, interval: float | Array) -> tuple
 def steady_filters(
     transition: Array, disturbance: Array, variance: Array
 ) -> list[tuple[Array, Array, float]]:
-    """The steady Kalman filters of systems whose first state is measured, as recursive filters.
+    """The steady Kalman filters of systems with a measured first state, as recursive filters.
 
     Args:
-        transition: over one interval, shape (systems, n, n), in SI units.
-        disturbance: its covariance over one interval, shape (systems, n, n), in SI units.
-        variance: of the noise of a reading, shape (systems,), rad².
+        transition: transition over one interval, shape (systems, n, n), in SI units.
+        disturbance: covariance of the disturbance over one interval, shape (systems, n, n), in SI units.
+        variance: variance of the noise of a reading, shape (systems,), rad².
 
     Returns:
-        For each system numerator and denominator, shape (n + 1,) each, of the filter from readings to
-        innovations, and the variance of the innovations, rad²; infinite where the filter does not converge.
+        For each system, the numerator and denominator, shape (n + 1,) each, of the filter from readings to
+        innovations, and the variance of the innovations, rad²; infinite if the filter does not converge.
     """
     # Prediction covariance of the filters: their Riccati equation by doubling (Anderson, Int. J. Control 28 (1978)
     # 295–306, doi 10.1080/00207177808922455).
@@ -114,8 +115,8 @@ class Driven:
     """A decay and the random moment that drives it.
 
     Args:
-        intensity: q, spectral intensity of the moment per inertia, rad²/s³; 0 where there is none.
-        corner: fb, Hz, of the moment's spectrum; None where it is white.
+        intensity: q, spectral intensity of the moment per inertia, rad²/s³; 0 without a moment.
+        corner: fb, corner frequency of the moment's spectrum, Hz; None if it is white.
     """
 
     decay: Decay
@@ -137,7 +138,7 @@ class Innovations:
     Args:
         variance: their expected variance, rad².
         cost: −2 ln L up to a constant, dimensionless.
-        gain: of a known input, rad/s² per unit; 0 where there is none.
+        gain: gain of a known input, rad/s² per unit; 0 without an input.
         gain_variance: variance of the gain with the other parameters fixed, in the square of its unit.
     """
 
@@ -155,9 +156,10 @@ def innovations(
 
     Args:
         values: readings or block means, shape (n,), rad.
-        interval: between them, s.
-        noise_variance: R, of one value, rad².
-        response: to a known input of unit gain, shape (n,), rad per unit of gain; None where there is none.
+        interval: interval between the values, s.
+        noise_variance: R, noise variance of one value, rad².
+        response: response to a known input of unit gain, shape (n,), rad per unit of gain; None without an
+            input.
 
     Returns:
         None where the model is out of range.
@@ -167,15 +169,15 @@ def innovations(
         motion = response_rows(time, model.decay)[:2]
     known = [] if response is None else [response]
     if model.corner is not None and model.intensity != 0.0:
-        # A moment that is not white has an unknown initial value. Its response is e^(−ct) less a free motion;
-        # the columns include the latter already.
+        # A moment that is not white has an unknown initial value. The response to it is e^(−ct) less a free
+        # motion; the columns already include the free motion.
         known.insert(0, np.exp(-2.0 * np.pi * model.corner * time))
     columns = np.vstack((values, motion, np.ones_like(time), *known))
     if not np.isfinite(columns).all():
         return None
     variance = noise_variance
     if model.intensity > 0.0:
-        from scipy.signal import lfilter  # only here: slow to load
+        from scipy.signal import lfilter  # imported here because it is slow to load
 
         factors = _factored(interval, model, noise_variance)
         if factors is None:
@@ -234,11 +236,11 @@ def _factored(interval: float, model: Driven, noise_variance: float) -> tuple[Ar
     return (characteristic, filtering, variance) if variance > 0.0 else None
 
 
-_DECADES = np.arange(-7.0, 3.1, 1.0)  # of q over R ω³, the intensity that doubles R within a radian
-_CORNERS = (8.0, 3.0, 1.0, 0.3)  # Hz; above these, the moment of a rig of a few Hz looks white
+_DECADES = np.arange(-7.0, 3.1, 1.0)  # decades of q over R ω³; at R ω³ the moment doubles R within a radian
+_CORNERS = (8.0, 3.0, 1.0, 0.3)  # Hz; above the first, the moment of a rig of a few Hz looks white
 _MAX_STEPS = 25
-_SETTLED = 0.01  # standard deviations
-_NUDGE = 0.1  # standard deviations of a and k; of ln q outright
+_SETTLED = 0.01  # step, in standard deviations, at which the iteration ends
+_NUDGE = 0.1  # step of a and k for differences, in standard deviations; of ln q directly
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,8 +249,8 @@ class DrivenFit:
 
     Args:
         covariance: of (a, k, ln q), shape (3, 3).
-        gained: covariance of (a, k, g) with the gain g of a known input, shape (3, 3); zeros for g where there is
-            none, or where it is k or a known number.
+        gained: covariance of (a, k, g) with the gain g of a known input, shape (3, 3); zeros for g without an
+            input, or if g is k or a known number.
     """
 
     model: Driven
@@ -263,8 +265,8 @@ class KnownInput:
     """The input of a driven run.
 
     Args:
-        response: to unit gain at the values of the fit, shape (n,), as a function of the decay.
-        gain: over the inertia, where the motion gives it; None where it is estimated.
+        response: response to unit gain at the values of the fit, shape (n,), as a function of the decay.
+        gain: gain over the inertia, if the motion gives it; None if it is estimated.
     """
 
     response: Callable[[Decay], Array]
@@ -287,9 +289,9 @@ def fit_driven(
 
     Args:
         values: block means of one run, shape (n,), rad.
-        interval: between them, s.
-        deviations: its standard deviations of (a, k), shape (2,), in 1/s and 1/s².
-        noise_variance: of one block mean, rad².
+        interval: interval between the block means, s.
+        deviations: standard deviations of (a, k) of the start, shape (2,), in 1/s and 1/s².
+        noise_variance: noise variance of one block mean, rad².
     """
     fit = _DrivenLikelihood(values, interval, noise_variance, deviations, known)
     bare = fit.at(Driven(start, 0.0))
@@ -330,7 +332,7 @@ class _DrivenLikelihood:
         return innovations(self.values, self.interval, model, self.noise_variance, row)
 
     def with_gain(self, found: DrivenFit) -> Array:
-        """Covariance of (a, k, g), shape (3, 3): g's variance at a fixed model plus the model's contribution."""
+        """Covariance of (a, k, g), shape (3, 3): g's variance for a fixed model plus the model's contribution."""
         jacobian = np.diag([1.0, 1.0, 0.0])
         for i, nudge in enumerate(self.nudges):
             away = nudge * np.eye(3)[i]

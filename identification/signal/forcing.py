@@ -1,9 +1,10 @@
 """The forcing of a run: the effect of its input on the motion. A free decay is a run with zero input.
 
-The motion is β̈ + 2aβ̇ + kβ = g u(t) + a constant, exact for an input that is held or linear between samples. It is
-linear in the initial angle and rate, in the gain g per unit inertia and in the sensor's zero. A body without a
-spring has k = 0, and its zero cannot be separated from its initial angle: its third unknown is instead a constant
-acceleration, from a moment added to the input. With a spring, such a moment shifts the zero.
+The motion is β̈ + 2aβ̇ + kβ = g u(t) + a constant, exact for an input that is held or linear between samples.
+It is linear in the initial angle and rate, in the gain g per unit inertia and in the sensor's zero. A body
+without a spring has k = 0, and its zero cannot be separated from its initial angle. Its third unknown is
+instead a constant acceleration, due to a moment added to the input. With a spring, such a moment shifts the
+zero.
 
 The response from rest and its derivatives with respect to a and k form one linear system of order six, driven by
 the input alone. Its exponential over a sample interval, with the input and its slope as further states (Van Loan,
@@ -38,19 +39,19 @@ from tunnel_sim.vocabulary.input_kinds import KnownGain
 from tunnel_sim.vocabulary.quantities import Angles, Gain, Times, Vector
 from tunnel_sim.vocabulary.record import Array, Record
 
-_OWN = 3  # unknowns of each run besides its coefficients
-_LEAST_SAMPLES = 4  # per unknown; with fewer the residual does not show the noise
+_OWN = 3  # number of unknowns of each run apart from its coefficients
+_LEAST_SAMPLES = 4  # samples per unknown; with fewer the residual does not show the noise
 _STATE = 6  # β, β̇, and their derivatives with respect to a and to k
-_LINES = 24  # least number of spectral lines for a start
-_POWER = 0.999  # least share of the response's power in these lines
+_LINES = 24  # minimum number of spectral lines for a start
+_POWER = 0.999  # minimum share of the response's power in these lines
 _ROUNDS = 8
-_GROWTH = 5.0  # logarithm of the growth over the record, beyond which a start overflows
+_GROWTH = 5.0  # logarithm of the growth over the record beyond which a start overflows
 
 
 _NO_GAIN = KnownGain()
 Rows: TypeAlias = Annotated[Array, "shape (rows, n), SI"]
 FreeStart: TypeAlias = Callable[[Record], Decay | None]
-"""Finds a decay close enough for the fit of a free decay to converge; None where none fits or nothing moves."""
+"""Finds a decay close enough for the fit of a free decay to converge; None if none fits or nothing moves."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -58,7 +59,7 @@ class Free:
     """No input: the coefficients of the motion are a and k.
 
     Args:
-        known: the gain of the input over the inertia, where the motion gives it; None where it is an unknown.
+        known: the gain of the input over the inertia, if the motion gives it; None if it is an unknown.
     """
 
     known: KnownGain | None = _NO_GAIN
@@ -70,29 +71,29 @@ class Free:
 
     @property
     def least_samples(self) -> int:
-        """With fewer, a fit of the run alone does not show the noise."""
+        """Minimum number of samples for a fit of the run alone to show the noise."""
         return 0
 
     @property
     def fixed(self) -> Array:
-        """The part c of (a, k, g) that depends on no unknown, shape (3,), SI."""
+        """The known part c of (a, k, g), shape (3,), SI."""
         return np.array([0.0, 0.0, 0.0 if self.known is None else self.known.constant])
 
     @property
     def sought(self) -> list[int]:
-        """Places in (a, k, g) of the unknowns of the run alone."""
+        """Places in (a, k, g) of the unknowns in a fit of the run alone."""
         return [0, 1, 2] if self.known is None else [0, 1]
 
     @property
     def link(self) -> Array:
-        """From these unknowns to the coefficients: L in (a, k, g) = L φ + c, shape (3, unknowns)."""
+        """Link from these unknowns to the coefficients: L in (a, k, g) = L φ + c, shape (3, unknowns)."""
         link = np.eye(3)[:, self.sought]
         if self.known is not None:
             link[2, 1] = self.known.per_stiffness
         return link
 
     def start(self, record: Record, free_start: FreeStart) -> Array | None:
-        """(a, k, g) from which a fit converges, shape (3,), in SI units; None where nothing oscillates.
+        """(a, k, g) from which a fit converges, shape (3,), in SI units; None without an oscillation.
 
         Args:
             free_start: finds the decay that starts the fit of a free decay.
@@ -101,7 +102,7 @@ class Free:
         return None if decay is None else np.array([decay.rate, decay.stiffness, 0.0])
 
     def at(self, coefficients: Array) -> tuple[Decay, float]:
-        """The decay and the gain of (a, k) or (a, k, g - c), shape (2,) or (3,), SI."""
+        """The decay and the gain from (a, k) or (a, k, g - c), shape (2,) or (3,), SI."""
         return Decay(float(coefficients[0]), float(coefficients[1])), 0.0
 
     def admits(self, decay: Decay, time: Times) -> bool:
@@ -121,12 +122,12 @@ class Free:
         return weights
 
     def freed(self, values: Angles, rows: Rows, gain: Gain) -> Angles:
-        """A reading less the response to the input."""
+        """The reading less the response to the input."""
         del rows, gain
         return values
 
     def alone(self, fit: RunFit) -> RunFit | None:
-        """A fit of this run alone with information in the order of free decays; None where it is not determined."""
+        """A fit of this run alone, with information in the order of free decays; None if it is not determined."""
         return fit
 
     def level(self, values: Angles, fitted: Zero) -> float:
@@ -136,15 +137,15 @@ class Free:
 
 
 FREE = Free()
-"""The forcing of all free decays."""
+"""The forcing of all free decays: none."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Forced(Free):
-    """An input of a body on a spring.
+    """The input of a body on a spring.
 
     Args:
-        values: of the input at the samples.
+        values: values of the input at the samples.
         held: whether the input is constant from one sample to the next; else linear.
         derivative: 0 where the readings are angles, 1 where they are rates. Zero and initial state are then rates
             too, since the rates of free motion obey the equation of its angles.
@@ -160,7 +161,7 @@ class Forced(Free):
 
     @property
     def least_samples(self) -> int:
-        """With fewer, a fit of the run alone does not show the noise."""
+        """Minimum number of samples for a fit of the run alone to show the noise."""
         return _LEAST_SAMPLES * (len(self.sought) + _OWN)
 
     def responses(self, time: Times, decay: Decay) -> Array:
@@ -169,18 +170,18 @@ class Forced(Free):
         return driven_rows(time, self.values, *of_decay, held=self.held, derivative=self.derivative)
 
     def start(self, record: Record, free_start: FreeStart, *, sprung: bool = True) -> Array | None:
-        """(a, k, g) from which a fit converges, shape (3,), in SI units; None where nothing oscillates."""
+        """(a, k, g) from which a fit converges, shape (3,), in SI units; None without an oscillation."""
         del free_start
         reading = record.time_s, record.yaw_rad
         start = driven_start(*reading, self.values, sprung=sprung, derivative=self.derivative)
         return None if start is None or (sprung and not start[1] > 0.0) else np.array(start)
 
     def at(self, coefficients: Array) -> tuple[Decay, float]:
-        """The decay and the gain of (a, k, g - c), shape (3,), SI."""
+        """The decay and the gain from (a, k, g - c), shape (3,), SI."""
         return super().at(coefficients)[0], float(coefficients[2] + self.fixed[2])
 
     def admits(self, decay: Decay, time: Times) -> bool:
-        """A record shows no resonance above half its sample rate."""
+        """Whether the resonance is below half the sample rate: a record shows none above."""
         return 0.0 < decay.stiffness < (np.pi / float(np.diff(time).min())) ** 2
 
     def rows(self, time: Times, decay: Decay) -> Rows:
@@ -196,11 +197,11 @@ class Forced(Free):
         return weights
 
     def freed(self, values: Angles, rows: Rows, gain: Gain) -> Angles:
-        """A reading less the response to the input."""
+        """The reading less the response to the input."""
         return np.asarray(values - gain * rows[5])
 
     def alone(self, fit: RunFit) -> RunFit | None:
-        """A known gain follows the stiffness, and an unknown one is eliminated."""
+        """The fit of this run alone: a known gain follows the stiffness, and an unknown gain is eliminated."""
         information, score = fit.information, fit.score
         if self.known is not None:
             moved = np.eye(6)[:, :GAIN]
@@ -216,27 +217,27 @@ class Forced(Free):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Loose(Forced):
-    """An input of a body without a spring."""
+    """The input of a body without a spring."""
 
     @property
     def sought(self) -> list[int]:
-        """Places in (a, k, g) of the unknowns of the run alone."""
+        """Places in (a, k, g) of the unknowns in a fit of the run alone."""
         return [0, 2]
 
     def start(self, record: Record, free_start: FreeStart, *, sprung: bool = False) -> Array | None:
-        """(a, 0, g) from which a fit converges, shape (3,), in SI units; None where nothing moves."""
+        """(a, 0, g) from which a fit converges, shape (3,), in SI units; None if nothing moves."""
         start = super().start(record, free_start, sprung=sprung)
         if start is not None:
             start[0] = max(start[0], -_GROWTH / record.duration)
         return start
 
     def admits(self, decay: Decay, time: Times) -> bool:
-        """Any decay rate is possible."""
+        """True: any decay rate is possible."""
         del decay, time
         return True
 
     def rows(self, time: Times, decay: Decay) -> Rows:
-        """The row of the zero is the response to a constant acceleration, whose derivatives come last."""
+        """The rows, with the response to a constant acceleration for the zero; its derivatives come last."""
         rest = driven_rows(time, np.ones(time.size), decay.rate, decay.stiffness, held=True)
         rows = np.vstack([super().rows(time, decay), rest[1:]])
         rows[4] = rest[0]
@@ -250,7 +251,7 @@ class Loose(Forced):
         return weights
 
     def alone(self, fit: RunFit) -> RunFit | None:
-        """The stiffness is known, and has a row of its own."""
+        """The fit of this run alone: the stiffness is known, and has a row of its own."""
         information, score = fit.information.copy(), fit.score.copy()
         information[STIFFNESS] = information[:, STIFFNESS] = score[STIFFNESS] = 0.0
         information[STIFFNESS, STIFFNESS] = 1.0
@@ -280,15 +281,16 @@ def driven_rows(
     """The response from rest to an input of unit gain, and its derivatives.
 
     Args:
-        time: since the first sample, shape (n,), s, increasing.
-        values: of the input at these times, shape (n,), rad/s² per unit gain.
+        time: time since the first sample, shape (n,), s, increasing.
+        values: values of the input at these times, shape (n,), rad/s² per unit gain.
         rate: a, 1/s.
         stiffness: k, 1/s².
         held: whether the input is constant from one sample to the next; else linear.
         derivative: 0 for the angle, 1 for its rate.
 
     Returns:
-        Angle (rad), its derivative with respect to a (rad s) and to k (rad s²), shape (3, n); of the rate, per s.
+        Angle (rad), its derivative with respect to a (rad s) and to k (rad s²), shape (3, n); for the rate, per
+        s.
     """
     steps = np.diff(time)
     if np.ptp(steps) <= 1e-6 * steps.mean():
@@ -307,7 +309,7 @@ def driven_rows(
     if steps.size == 1:
         state[1:] = pushed
         power, reach = transition[0], 1
-        while reach < time.size:  # each round, a state includes the input of the last `reach` intervals
+        while reach < time.size:  # in each round, a state includes the input of the last `reach` intervals
             state[reach:] += state[:-reach] @ power.T
             power, reach = power @ power, 2 * reach
     else:
@@ -326,13 +328,13 @@ def driven_start(
     Contr. 8 (1963) 56–58).
 
     Args:
-        time: of the samples, shape (n,), s.
-        reading: of the response, shape (n,), rad, or rad/s of its rate.
-        values: of the input, shape (n,).
+        time: times of the samples, shape (n,), s.
+        reading: reading of the response, shape (n,), rad, or rad/s for its rate.
+        values: values of the input, shape (n,).
         derivative: 0 where the reading is the angle, 1 where it is the rate.
 
     Returns:
-        a (1/s), k (1/s²) and g (rad/s² per unit); None where the response contains no motion.
+        a (1/s), k (1/s²) and g (rad/s² per unit); None if the response contains no motion.
     """
     count = time.size
     response, moved = np.fft.rfft(reading - reading.mean()), np.fft.rfft(values - values.mean())

@@ -18,8 +18,8 @@ import numpy as np
 
 from tunnel_sim.vocabulary.record import Array
 
-# |Δt²| below which the series is used: eight terms are accurate to 1e-19 at 0.25; above it the quotients lose at
-# most one digit.
+# |Δt²| below which the series is used: at 0.25 eight terms are accurate to 1e-19; above it the quotients lose
+# at most one digit.
 _SERIES_LIMIT = 0.25
 _SERIES_TERMS = 8
 _SERIES = np.array(
@@ -68,7 +68,7 @@ def response_rows(time: Array, decay: Decay, *, constant: bool = False) -> Array
 
     Args:
         time: times since the initial state, shape (n,), s.
-        constant: whether a row of ones, the sensor's zero, comes last.
+        constant: whether to append a row of ones, the sensor's zero.
 
     Returns:
         Rows u [-], s [s], w [s³], t·s [s²], shape (4, n) or (5, n).
@@ -126,7 +126,7 @@ def free_decay(time: Array, decay: Decay, angle: float, rate: float) -> Array:
 def sensitivity_weights(decay: Decay, angle: float, rate: float) -> Array:
     """Weights of the rows of `response_rows` in ∂β/∂a [rad s] and ∂β/∂k [rad s²], shape (2, 4).
 
-    The arguments as in `free_decay`.
+    Arguments as in `free_decay`.
     """
     a, k = decay.rate, decay.stiffness
     return np.array(
@@ -138,7 +138,7 @@ def sensitivity_weights(decay: Decay, angle: float, rate: float) -> Array:
 
 
 def envelope_amplitude(decay: Decay, angle: float, rate: float) -> float:
-    """√(β₀² + ((r₀ + aβ₀)/ωd)²), the envelope at the time of the initial state; |β₀| where nothing oscillates.
+    """√(β₀² + ((r₀ + aβ₀)/ωd)²), the envelope at the time of the initial state; |β₀| without an oscillation.
 
     In rad, with arguments as in `free_decay`.
     """

@@ -26,7 +26,7 @@ from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced, read_only
 Complex = NDArray[np.complex128]
 # Fourth powers of readings and of times are summed over a record: beyond these limits they overflow or underflow.
 _LEAST, _GREATEST = 1e-60, 1e60
-_ROUNDING = 1e-12  # of the largest reading: a few thousand rounding errors, with no detectable motion
+_ROUNDING = 1e-12  # share of the largest reading: a few thousand rounding errors, without detectable motion
 
 
 def holds_motion(record: Record) -> bool:
@@ -49,9 +49,10 @@ def holds_motion(record: Record) -> bool:
     )
 
 
-_PADDING = 8  # zero padding: eight times the record, so the interpolated peak sits within 1/16 of a bin
+# zero padding to eight times the record, which places the interpolated peak within 1/16 of a bin
+_PADDING = 8
 
-_FEWEST_CYCLES = 2.0  # in a record whose motion lasts to its end
+_FEWEST_CYCLES = 2.0  # minimum number of cycles in a record with motion until its end
 
 
 @dataclass(frozen=True)
@@ -59,8 +60,9 @@ class SpectralPeak:
     """The highest peak of a power spectral density.
 
     Args:
-        frequency: of the peak, Hz; 0 where the record contains no motion (`holds_motion`).
-        prominence: its power over the median's; white noise alone reaches 40 less than once in 1e6 records.
+        frequency: frequency of the peak, Hz; 0 if the record contains no motion (`holds_motion`).
+        prominence: power of the peak over the median's; white noise alone reaches 40 less than once in 1e6
+            records.
     """
 
     frequency: float
@@ -73,10 +75,10 @@ def psd_peak(record: Record, *, padding: int = _PADDING, falling: bool = False) 
     A Hann window keeps the offset and the negative frequencies from leaking into the peak.
 
     Args:
-        padding: the record is padded with zeros to at least this number of times its length; 1 is faster, and
-            sufficient to start a fit of many cycles.
-        falling: whether the window falls from the start of the record instead of rising first: it then includes a
-            decay that ends long before the record does.
+        padding: minimum length after zero padding, in lengths of the record; 1 is faster, and sufficient to
+            start a fit of many cycles.
+        falling: whether the window falls from the start of the record instead of rising first: it then captures
+            a decay that ends long before the record does.
     """
     frequency, power = _spectral_peak(record, padding, falling)
     highest = float(power[:-1].max(initial=0.0))
@@ -86,12 +88,12 @@ def psd_peak(record: Record, *, padding: int = _PADDING, falling: bool = False) 
 def psd_peak_std(record: Record, frequency: float, noise_std: float) -> float:
     """Standard deviation of the frequency of `psd_peak` by noise, without its bias, Hz.
 
-    The peak is where the slope of the power is zero: to first order the noise moves it by its share of the slope,
-    over the curvature.
+    The slope of the power is zero at the peak. To first order the noise moves the peak by the noise's part of
+    the slope over the curvature.
 
     Args:
-        frequency: of the peak, Hz, above 0.
-        noise_std: of one sample, rad; of coloured noise, the root of its power at the frequency.
+        frequency: frequency of the peak, Hz, above 0.
+        noise_std: noise of one sample, rad; for coloured noise, the root of its power at the frequency.
     """
     record = evenly_spaced(record, bridged=False)
     centred = record.yaw_rad - record.yaw_rad.mean()
@@ -126,8 +128,8 @@ def highest_peak(values: Array, size: int, lowest: int = 1) -> tuple[float, Arra
 
     Args:
         values: the series, windowed, without its mean, shape (n,).
-        size: number of samples it is padded to with zeros, at least n.
-        lowest: first bin considered; the last bin is never considered.
+        size: number of samples after zero padding, at least n.
+        lowest: first bin to consider; the last bin is never considered.
     """
     power = np.abs(np.fft.rfft(values, size)) ** 2
     peak = lowest + int(np.argmax(power[lowest:-1]))
@@ -140,12 +142,12 @@ def highest_peak(values: Array, size: int, lowest: int = 1) -> tuple[float, Arra
 def peak_of_swing(swing: Array, size: int) -> float:
     """The highest point of the spectrum of a decay, in bins, with a Hann window.
 
-    A peak below two cycles of the series does not come from the motion: a heavily damped one is over before the
-    middle of the series. The peak is then sought with a window that falls from the start.
+    A peak below two cycles of the series does not come from the motion: a heavily damped motion is over before
+    the middle of the series. The peak is then sought with a window that falls from the start.
 
     Args:
         swing: the series without its mean, shape (n,), any unit.
-        size: number of samples it is padded to with zeros, at least n.
+        size: number of samples after zero padding, at least n.
     """
     place, _ = highest_peak(swing * _window(swing.size, falling=False), size)
     per_cycle = size / swing.size
@@ -160,12 +162,12 @@ def _window(size: int, falling: bool) -> Array:
 
 
 _SAMPLES = 1024  # candidates are compared on a thinned record; the fit itself uses every sample
-_LONG = 4096  # samples for the spectrum; a longer record is thinned to them and not padded
+_LONG = 4096  # maximum number of samples for the spectrum; a longer record is thinned and not padded
 _DAMPING_RATIOS = (0.0, 0.002, 0.006, 0.02, 0.06, 0.2, 0.5)
 
 
 def starting_decay(record: Record) -> Decay | None:
-    """A decay close enough for the least-squares fit to converge; None where none fits or nothing moves.
+    """A decay close enough for the least-squares fit to converge; None if none fits or nothing moves.
 
     For records of many cycles the candidates are the peak of the power spectral density with several damping
     ratios; for heavily damped ones, the fit of the twice integrated equation of motion. The candidate of least sum
@@ -196,7 +198,7 @@ _FREQUENCIES: WeakKeyDictionary[Record, float | None] = WeakKeyDictionary()
 
 
 def starting_frequency(record: Record) -> float | None:
-    """The approximate frequency of the strongest oscillation, Hz; None where the record contains no motion.
+    """The approximate frequency of the strongest oscillation, Hz; None if the record contains no motion.
 
     It is found once for each record: the examination and the methods all begin with it.
     """
@@ -217,24 +219,25 @@ def _find_frequency(record: Record) -> float | None:
     return _strongest_decay(evenly_spaced(record, bridged=False), frequency) or None
 
 
-_SHORTEST = 64  # samples of the shortest decay that is compared
+_SHORTEST = 64  # minimum number of samples of the shortest compared decay
 _FALLS = 4.0  # decay rate times duration: to 2 % of the first swing
 _SHORTER = 4  # ratio of successive durations: the best one is at most twice as long or short as the decay
-_CLEARLY = 2.0  # times the energy of the frequency found first: noise and leakage do not make up as much
-_LOWEST = 2.0  # cycles of a decay: below them is the drift of its centre
-_BESIDE = 2  # points of the spectrum on either side, which belong to the same peak
+_CLEARLY = 2.0  # minimum ratio to the energy of the frequency found first: noise and leakage do not reach it
+_LOWEST = 2.0  # minimum number of cycles of a decay: fewer are the drift of its centre
+_BESIDE = 2  # points of the spectrum on either side that belong to the same peak
 
 
 def _strongest_decay(record: Record, found: float) -> float:
-    """The frequency of the decaying sinusoid that explains clearly more of a record than another one, Hz.
+    """The frequency of a decaying sinusoid that explains clearly more of a record than the given frequency, Hz.
 
-    A decay that is over long before the record ends is weak in the spectrum of the whole record, in which the drift
-    of the centre and slow leakage are strong. Each decay rate therefore has its own spectrum: the record times that
-    decay, which is the matched filter, without the parabola of the centre. It is the least-squares fit of one decay
-    at each frequency, for several rates.
+    A decay that is over long before the record ends is weak in the spectrum of the whole record, in which the
+    drift of the centre and slow leakage are strong. Each tried decay rate therefore has its own spectrum: of
+    the record, without the parabola of its centre, times the decay. This is the matched filter, a least-squares
+    fit of one decay at each frequency.
 
     Args:
-        found: the other one, which is returned otherwise: the highest peak of the spectrum of block means; 0: none.
+        found: the given frequency, which is returned otherwise: the highest peak of the spectrum of block
+            means; 0: none.
     """
     values, rate = record.yaw_rad - record.yaw_rad.mean(), record.sample_rate
     best, strongest, known = found, 0.0, 0.0
@@ -268,7 +271,7 @@ def thinned_reading(record: Record, frequency: float) -> Reading:
     """Block means of a record, at least twenty per cycle, about a thousand of a long one; the clock starts at 0.
 
     Args:
-        frequency: of its oscillation, Hz.
+        frequency: frequency of the oscillation, Hz.
     """
     factor = max(1, min(record.time_s.size // _SAMPLES, int(record.sample_rate / (20.0 * frequency))))
     return Reading(
@@ -283,10 +286,10 @@ def _integral(time: Array, values: Array) -> Array:
 
 PEAK_HALF_WIDTH = PEAK_HALF_TURN / (
     2.0 * np.pi
-)  # of a period, on either side of a peak, for the fit of its parabola
-_LEAST_SAMPLES = 1.5001  # on either side of a peak, whose parabola needs three
+)  # share of a period on either side of a peak, for the fit of its parabola
+_LEAST_SAMPLES = 1.5001  # minimum number of samples on either side of a peak: its parabola needs three
 _LEAST_PEAKS = 4
-_MOVES = 8  # of half a window each
+_MOVES = 8  # maximum number of moves, of half a window each
 
 
 @dataclass(frozen=True)
@@ -295,9 +298,9 @@ class PeakDecay:
 
     Args:
         rate: decay rate σ, 1/s; the time to half amplitude is ln 2/σ.
-        rate_std: its standard deviation, 1/s.
+        rate_std: standard deviation of the rate, 1/s.
         zero: the sensor's zero, rad.
-        zero_std: its standard deviation from the scatter of the peaks, rad.
+        zero_std: standard deviation of the zero from the scatter of the peaks, rad.
     """
 
     rate: float
@@ -310,11 +313,11 @@ def peak_decay(record: Record, frequency: float, noise: PeakNoise) -> PeakDecay 
     """The decay rate from a line through the logarithm of the peaks, of both signs, against time.
 
     The zero is the mean of (p₁ + 2p₂ + p₃)/4 over neighbouring peaks, which are evenly placed about it. Peaks
-    are followed until they fall below a tenth of the first. Where they scatter about the line more than the noise
-    does, beyond chance, the deviation comes from the scatter. None where there are fewer than four peaks.
+    are followed until they fall below a tenth of the first. If they scatter about the line more than the noise
+    explains, the standard deviation comes from the scatter. None if there are fewer than four peaks.
 
     Args:
-        frequency: of the oscillation, Hz.
+        frequency: frequency of the oscillation, Hz.
     """
     times, heights = follow_peaks(record, frequency)
     if times.size < _LEAST_PEAKS:
@@ -351,8 +354,8 @@ def follow_peaks(record: Record, frequency: float, *, sparse: bool = False) -> t
     A peak is the vertex of a parabola through the samples within a twelfth of a period of it.
 
     Args:
-        frequency: of the oscillation, Hz.
-        sparse: whether three samples make a peak where a twelfth of a period has fewer, as noise does too.
+        frequency: frequency of the oscillation, Hz.
+        sparse: whether three samples make a peak if a twelfth of a period has fewer; noise does so, too.
 
     Returns:
         Instants since the first sample in s and heights in rad, shape (n,) each; they end where peaks no longer
@@ -372,7 +375,7 @@ def follow_peaks(record: Record, frequency: float, *, sparse: bool = False) -> t
         expected = float(time[search[np.argmax(np.abs(record.yaw_rad[search] - middle))]])
     while expected + width <= time[-1]:
         vertex, at = None, expected
-        for _ in range(_MOVES):  # where the period drifts, the window follows the peak
+        for _ in range(_MOVES):  # if the period drifts, the window follows the peak
             low, high = np.searchsorted(time, (at - width, at + width))
             if high - low < 3:
                 break
@@ -408,11 +411,13 @@ def _parabola(x: Array, y: Array) -> Array:
     return np.asarray(np.linalg.lstsq(columns.T, y, rcond=None)[0])
 
 
-_LENGTH = 0.35  # rows over blocks: a third is best at light damping, and more has little effect elsewhere
+# ratio of rows to blocks: a third is best at light damping, and more has little effect elsewhere
+_LENGTH = 0.35
 _LEAST_BLOCKS = 8
-_DENSE = 64  # values up to which a full decomposition is faster than the iteration, slow in pure noise
+# number of values up to which a full decomposition is faster than the iteration, slow in pure noise
+_DENSE = 64
 _MAX_SWEEPS = 60
-_SETTLED = 1e-10  # change of the subspace in a sweep
+_SETTLED = 1e-10  # maximum change of the subspace in a sweep
 _LEAST_POLE = 1e-9  # a decay that is over before the second value
 
 
@@ -421,7 +426,7 @@ class PencilDecay:
     """A decay and its sensitivity to the noise.
 
     Args:
-        exponents: of both poles, shape (2,), 1/s.
+        exponents: exponents of both poles, shape (2,), 1/s.
         duals: left vectors of the shift, by pole, shape (2, rows - 1).
         images: right vectors of the matrix, by pole, shape (columns, 2).
         interval: between the values, s.
@@ -451,7 +456,7 @@ class PencilDecay:
 
 
 def pencil_decay(values: Array, interval: float, omega: float) -> PencilDecay | None:
-    """The decay of uniformly spaced values by the matrix pencil; None where they are too few, or contain none.
+    """The decay of uniformly spaced values by the matrix pencil; None if they are too few, or contain no decay.
 
     The Hankel matrix of a decay, with the mean of each row removed, has rank two. A shift by one value maps its
     column space onto itself, and the eigenvalues of this 2×2 map are the exponentials of the poles. The two
@@ -461,7 +466,7 @@ def pencil_decay(values: Array, interval: float, omega: float) -> PencilDecay | 
 
     Args:
         values: readings or block means of them, offset included, shape (n,), rad.
-        interval: between them, s; well below half a period.
+        interval: interval between the values, s; well below half a period.
         omega: an approximate angular frequency to start the iteration, rad/s.
     """
     if values.size < _LEAST_BLOCKS:

@@ -14,14 +14,15 @@ from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.record import evenly_spaced
 
 _DEGREES = 180.0 / np.pi
-_SAME_GAIN = 0.5  # greatest relative error of a start's gain: errors of sign and unit are far larger
+_SAME_GAIN = 0.5  # maximum relative error of a start's gain: errors of sign and unit are far larger
 
 
 def refuse_other_gains(campaign: Campaign) -> None:
-    """Refuse the acceleration of a base whose sign or unit the motion contradicts.
+    """Refuse the acceleration of a base with a sign or unit that the motion contradicts.
 
-    Its gain over the inertia is known. The input is refused where the motion shows another gain beyond doubt: of
-    opposite sign, or in degrees instead of radians (where the sensor's values must be plausible).
+    The gain over the inertia is known for such an input. The input is refused if the motion shows another gain
+    beyond
+    doubt: of opposite sign, or in degrees instead of radians (if the sensor's values must be plausible).
 
     Raises:
         TunnelError: for the first such input.
@@ -56,7 +57,7 @@ def _refuse_other_gain(run: Run, drive: Input, derivative: int, where: str, *, j
 
 
 def _gain_differs(run: Run, start: tuple[float, float, float], derivative: int) -> bool:
-    """Whether the gain that best fits a run differs from the known gain far beyond its noise."""
+    """Whether the best-fitting gain of a run differs from the known gain far beyond the noise."""
     reading = Reading.from_run(run, derivative)
     found = fit_decays([reading], [np.eye(3)], np.array(start) - reading.forcing.fixed)
     if not found.converged or not determined(found.normal):

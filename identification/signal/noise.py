@@ -1,11 +1,12 @@
-"""The noise of the sensor, and whether the residual of a fit is that noise and nothing else.
+"""The noise of the sensor, and whether the residual of a fit is this noise alone.
 
-The fast part of a residual (its sixth differences) contains only noise, whatever the model. The slow part (means
-over an eighth of a cycle) also contains the misfit of the model, in the band of the oscillation, which
-determines the parameters. White noise has the same power in both: their ratio is tested by F. Where they differ,
-the noise may be coloured: its spectrum is taken between the harmonics of the motion
-(`identification.signal.colour`), and the same test judges the whitened residual. Noise that passes has the power of
-its spectrum at the frequency of the motion in every standard deviation; a residual that does not is a misfit.
+The fast part of a residual (its sixth differences) contains only noise, whatever the model. The slow part
+(means over an eighth of a cycle) also contains the misfit of the model, in the band of the oscillation, which
+determines the parameters. White noise has the same power in both: their ratio is tested by F. Where they
+differ, the noise may be coloured: its spectrum is taken between the harmonics of the motion
+(`identification.signal.colour`), and the same test judges the whitened residual. If the residual passes, all
+standard deviations use the power of this spectrum at the frequency of the motion; if not, the residual is a
+misfit.
 """
 
 from __future__ import annotations
@@ -30,9 +31,9 @@ _ORDER = 6
 # Σ (C(12, 6+j)/C(12, 6))² = C(24, 12)/C(12, 6)².
 _DIFFERENCE_GAIN = 924.0
 _SAMPLES_PER_DEGREE = 2704156.0 / 924.0**2
-_LONGEST_CYCLE = 8e9  # samples: longer than any record
-_BLOCKS = 8  # in a cycle, of the slow part
-_PARTS = 16  # of a residual, in which noise has the same power
+_LONGEST_CYCLE = 8e9  # number of samples: longer than any record
+_BLOCKS = 8  # number of blocks in a cycle, for the slow part
+_PARTS = 16  # number of parts of a residual in which noise has the same power
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +42,7 @@ class Residual:
 
     Args:
         values: reading less model, shape (n,), rad.
-        cycle: samples in a cycle of the motion.
+        cycle: number of samples in a cycle of the motion.
         unknowns: number of parameters fitted to the run's own data.
         peak: greatest deviation of the reading from the sensor's zero, rad.
     """
@@ -71,8 +72,8 @@ class ReadingNoise:
     """The noise of fitted runs.
 
     Args:
-        colours: of each run's noise; none where it is white.
-        powers: of each run's coloured noise at the frequency of its motion, rad²; none where it is white.
+        colours: colour of each run's noise; none where it is white.
+        powers: power of each run's coloured noise at the frequency of its motion, rad²; none where it is white.
     """
 
     level: NoiseLevel
@@ -93,7 +94,7 @@ def stated_noise(sensor: SensorProperties) -> float | None:
 
 
 def noise_of(residuals: Sequence[Residual], sensor: SensorProperties) -> ReadingNoise:
-    """The noise behind the standard deviations: the stated level where residuals agree, else the measured one."""
+    """The noise behind the standard deviations: the stated level if the residuals agree, else the measured."""
     floor = LEAST_NOISE * max(residual.peak for residual in residuals)
     unknowns = sum(residual.unknowns for residual in residuals)
     count = sum(residual.values.size for residual in residuals)
@@ -133,7 +134,7 @@ def noise_level(residuals: Sequence[Residual], sensor: SensorProperties) -> Nois
 
 
 def _squares(parts: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """Sums of squares, and their numbers, of all runs together."""
+    """Sums of squares, and numbers of squares, of all runs together."""
     return sum(power for power, _ in parts), sum(count for _, count in parts)
 
 
@@ -143,7 +144,7 @@ def _exceeds(power: float, freedom: float, degrees: float) -> tuple[bool, float]
     Args:
         power: sum of squares over the variance of the noise.
         freedom: degrees of freedom of the power.
-        degrees: of freedom of the variance of the noise.
+        degrees: degrees of freedom of the variance of the noise.
     """
     if freedom < 3:
         return False, 1.0
@@ -152,15 +153,15 @@ def _exceeds(power: float, freedom: float, degrees: float) -> tuple[bool, float]
 
 
 def _coloured(residuals: Sequence[Residual], total: float, stated: float | None) -> ReadingNoise | None:
-    """Coloured noise that explains the residuals; None where there is none.
+    """Coloured noise that explains the residuals; None if there is none.
 
-    It does where the whitened residuals pass the test of white noise, also close to the motion alone, and have one
-    power in all parts of a run: the misfit of a model lies there, or changes along the run, and a random moment
-    excites the resonance. Noise does not exceed its stated level.
+    It explains them if the whitened residuals pass the test of white noise, also near the motion alone, and
+    have one power in all parts of a run. The misfit of a model lies near the motion or changes along the run,
+    and a random moment excites the resonance. The noise must not exceed its stated level.
 
     Args:
         total: standard deviation of the residuals, rad.
-        stated: noise, rad; None where it is not stated.
+        stated: stated noise, rad; None where it is not stated.
     """
     colours, innovations = [], []
     for residual in residuals:
@@ -204,7 +205,7 @@ def _independent_squares(residual: Residual) -> float:
 
 _ODD = np.arange(
     1.0, 16.0, 2.0
-)  # harmonics of the motion that alternate from peak to peak as its own line does
+)  # odd harmonics of the motion, which alternate from peak to peak like its own line
 PEAK_HALF_TURN = np.pi / 6.0
 """Angle of the motion within the half width of a peak, a twelfth of a period, rad."""
 
@@ -213,12 +214,14 @@ PEAK_HALF_TURN = np.pi / 6.0
 class PeakNoise:
     """Noise of the vertex of a parabola through the samples within a twelfth of a period of a peak.
 
-    Its height is their mean with weights (9 − 15x²)/8 and its slope that with weights 3x/2, with the place x within
-    ±1. A line through peaks of alternating sign averages all noise but that near the odd harmonics of the motion.
+    Its height is the samples' mean with weights (9 − 15x²)/8, and its slope their mean with weights 3x/2, with
+    the place x within ±1. A line through peaks of alternating sign averages out all noise except near the odd
+    harmonics of the motion.
 
     Args:
         height: standard deviation of the height, rad.
-        slope: of the slope per half width, rad; of the instant, over ω² h w for a height h and a half width w.
+        slope: standard deviation of the slope per half width, rad; of the instant, over ω² h w for a height h
+            and a half width w.
     """
 
     height: float
@@ -241,8 +244,8 @@ def white_noise(reading: Array, sensor: SensorProperties) -> float:
     """The white part of a reading's noise, from its sixth differences: standard deviation of one sample, rad.
 
     Args:
-        reading: of many samples per cycle, evenly spaced, shape (n,), rad.
-        sensor: its stated noise is used where the reading agrees with it; quantisation is included.
+        reading: reading of many samples per cycle, evenly spaced, shape (n,), rad.
+        sensor: the sensor; its stated noise is used if the reading agrees with it. Quantisation is included.
     """
     return _as_stated(*_white_part(reading), _floor(reading), sensor)
 
@@ -253,10 +256,10 @@ def reading_noise(record: Record, sensor: SensorProperties) -> float:
 
 
 def measured_noise(record: Record) -> tuple[float, float]:
-    """The white part of a record's noise by its readings alone, whatever the sensor states.
+    """The white part of a record's noise from its readings alone, ignoring the sensor's statements.
 
     Args:
-        record: of many samples per cycle, with any spacing of its times.
+        record: record of many samples per cycle, with any spacing of its times.
 
     Returns:
         Standard deviation of one sample, rad, and the degrees of freedom of its variance.
@@ -293,7 +296,7 @@ def _floor(reading: Array) -> float:
 def slow_power(values: Angles, block: int) -> tuple[float, int]:
     """Power of the slow part of a residual, rad², and the number of blocks.
 
-    The power of white noise is its variance times that number.
+    The power of white noise is its variance times the number of blocks.
 
     Args:
         block: number of samples in a block, such as `Residual.block`.
@@ -306,7 +309,7 @@ def _steady_along(runs: Sequence[Array]) -> bool:
     """Whether white values have one power in all parts of every run.
 
     Args:
-        runs: their values, shape (n,).
+        runs: values of the runs, shape (n,) each.
     """
     split = [np.array_split(values, _PARTS) for values in runs]
     power = np.array([[float(np.mean(one**2)) for one in run] for run in split]).T
@@ -315,7 +318,7 @@ def _steady_along(runs: Sequence[Array]) -> bool:
 
 
 def _as_stated(fast: float, degrees: float, floor: float, sensor: SensorProperties) -> float:
-    """The stated noise where the measured one agrees with it, else the measured one."""
+    """The stated noise if the measured noise agrees with it, else the measured noise."""
     fast = max(fast, floor, (sensor.resolution or 0.0) / sqrt(12.0))
     stated = stated_noise(sensor)
     return max(stated, floor) if stated is not None and _agree(fast, max(stated, floor), degrees) else fast

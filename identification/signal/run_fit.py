@@ -1,8 +1,8 @@
 """Identification of one run: start, least squares, noise, standard deviations, windows.
 
-Every method has the same test of whether one damped oscillation explains a record. With little noise, a method's
-own motion would fail it by the error of the method alone. The least-squares motion nearest to the method's decay
-is tested instead, by `noise.noise_level`.
+Every method uses the same test of whether one damped oscillation explains a record. With little noise, a
+method's own motion would fail it by the error of the method alone. The test therefore uses the least-squares
+motion nearest to the method's decay, in `noise.noise_level`.
 """
 
 from __future__ import annotations
@@ -36,7 +36,8 @@ _LEAST_WINDOWS = 4
 # A steady change over n windows is n − 1 standard deviations of their successive differences; 3.29 are required.
 _LEAST_TO_SEE_CHANGE = 5
 _LEAST_SAMPLES = 16
-_TOLERANCE = 1e-5  # relative, of a window's fit; the next Gauss–Newton step would be a thousand times smaller
+# relative tolerance of a window's fit; the next Gauss–Newton step would be a thousand times smaller
+_TOLERANCE = 1e-5
 NO_WINDOWS = 10**6
 """Cycles per window longer than any record, so that a run has no windows."""
 _UNKNOWNS = 5
@@ -49,8 +50,8 @@ class Gained:
 
     Args:
         coefficients: a (1/s), k (1/s²) and g (rad/s² per unit of the input), shape (3,).
-        weight: their information, the other unknowns eliminated, shape (3, 3); rows of zeros for a k known to be 0,
-            and for a g that is k or a known number.
+        weight: their information, the other unknowns eliminated, shape (3, 3); rows of zeros for a k known to
+            be 0, and for a g that is k or a known number.
         offset: for a body without a spring, the constant moment added to the input, in the unit of the input.
     """
 
@@ -60,11 +61,11 @@ class Gained:
 
     @classmethod
     def of(cls, coefficients: Array, covariance: Array, sought: Sequence[int] = (0, 1)) -> Gained:
-        """From the covariance of those sought, at their places in (a, k, g).
+        """From the covariance of the fitted coefficients, at their places in (a, k, g).
 
         Args:
             coefficients: (a, k, g), shape (3,), in SI units.
-            covariance: shape (s, s), in the products of their units.
+            covariance: covariance of the fitted coefficients, shape (s, s), in the products of their units.
         """
         weight = np.zeros((3, 3))
         weight[np.ix_(sought, sought)] = inverse(covariance)
@@ -84,8 +85,8 @@ class FittedRun:
     """A run and its fit.
 
     Args:
-        fit: None where the run could not be identified; the estimate's status says why.
-        gained: decay rate, stiffness and gain from the fit; None where fit is.
+        fit: the fit; None if the run could not be identified; the estimate's status says why.
+        gained: decay rate, stiffness and gain from the fit; None if ``fit`` is None.
     """
 
     reading: Reading
@@ -104,9 +105,9 @@ def identify_run(run: Run, sensor: SensorProperties, *, cycles_per_window: int |
     """Identify ωn, ζ, the initial state and the zero of one run by maximum likelihood, for any spring.
 
     Args:
-        run: with its input where it is driven; stiffness and gain are not used, except that a body without a spring
-            has k = 0.
-        cycles_per_window: periods in each window of a free decay; where None three, or one in a short record.
+        run: the run, with its input if it is driven; stiffness and gain are not used, except that a body
+            without a spring has k = 0.
+        cycles_per_window: periods in each window of a free decay; None: three, or one in a short record.
     """
     reading = Reading.from_run(run, sensor.derivative)
     forcing = reading.forcing
@@ -143,7 +144,7 @@ def _gained(run: Run, reading: Reading, fit: DecayFit, variance: float) -> Gaine
     weight[np.ix_(sought, sought)] = eliminate(fit.normal, np.zeros(size + 1), size)[0] / variance
     coefficients = np.array([fitted.decay.rate, fitted.decay.stiffness, fitted.gain])
     offset = None
-    if run.drive is not None and run.unrestrained:  # the constant acceleration, over the gain
+    if run.drive is not None and run.unrestrained:  # the constant acceleration over the gain
         slope = np.array([0.0, -fit.zero / fitted.gain**2, 1.0 / fitted.gain])
         std = float(np.sqrt(slope @ inverse(fit.normal) @ slope * variance))
         offset = Quantity(fit.zero / fitted.gain, std, run.drive.kind.unit)
@@ -174,7 +175,7 @@ def residuals_of(
     """The residuals of fitted runs, with the data needed to test them.
 
     Args:
-        zero: the sensor's, rad.
+        zero: the sensor's zero, rad.
         unknowns: number of parameters fitted to each run's own data.
     """
     residuals = []
@@ -201,7 +202,7 @@ def noise_and_failure(
     """The noise from the residual of one run's fit, and the status of a failure; None if there is none.
 
     Args:
-        zero: its sensor zero, rad.
+        zero: sensor zero of the run, rad.
     """
     noise = noise_of(residuals_of([reading], [fitted], zero, _UNKNOWNS), sensor)
     motion = reading.yaw - zero - fitted.residual
@@ -223,13 +224,13 @@ def describe_run(
 ) -> RunEstimate:
     """The result of one run from its decay, whatever the method.
 
-    The initial state and the zero fit the decay best; their uncertainty combines the reading's and
-    the decay's. The only status is NOT_DETERMINED, where the covariance is not positive definite.
+    The initial state and the zero fit the decay best; their uncertainty combines the reading's and the decay's.
+    The only status is NOT_DETERMINED, for a covariance that is not positive definite.
 
     Args:
-        zero: its sensor zero, rad.
-        covariance: of (a, k), shape (2, 2), in 1/s and 1/s².
-        noise_variance: of one sample of the reading, rad².
+        zero: sensor zero of the run, rad.
+        covariance: covariance of (a, k), shape (2, 2), in 1/s and 1/s².
+        noise_variance: noise variance of one sample of the reading, rad².
     """
     if not determined(covariance):
         return RunEstimate(run.id, (Status.NOT_DETERMINED,))
@@ -275,16 +276,17 @@ def _departing_windows(
     omega_n: Quantity,
     windows: tuple[WindowEstimate, ...],
 ) -> tuple[WindowEstimate, ...]:
-    """Windows of a run whose frequency changes so much along it that no single oscillation describes it.
+    """Windows of a run with a frequency that changes too much for a single oscillation to describe the run.
 
-    The fit then loses step with the motion, and mistakes this for damping. A random moment leaves as large a
-    residual, but the frequencies of its windows scatter: their successive differences are the measure.
+    The fit then loses phase against the motion, and mistakes this for damping. A random moment leaves as large
+    a residual, but the frequencies of its windows scatter: their successive differences measure this scatter.
 
     Returns:
-        The windows, of single cycles where the run has few others; none where one oscillation describes the motion,
-        or where frequencies differ along the run, and from its own, by no more than such a scatter.
+        The windows, of single cycles if the run has few others. None if one oscillation describes the motion,
+        or if the frequencies change along the run, and differ from the run's own, by no more than such a
+        scatter.
     """
-    # Slower than a cycle, the residual is a drift of the centre, by which the fit does not lose step.
+    # slower than a cycle, the residual is a drift of the centre, which does not affect the fit's phase
     residual = fitted.residual - _mean_over_a_cycle(fitted.residual, reading, fitted.decay)
     missed = max(float(np.mean(residual**2)) - noise.std**2, 0.0)
     if missed <= GROSS_MISFIT * float(np.var(reading.yaw)):
@@ -302,7 +304,7 @@ def _departing_windows(
 
 
 def _mean_over_a_cycle(residual: Array, reading: Reading, decay: Decay) -> Array:
-    """The running mean of a residual over about one cycle, shape (n,), rad; zero where a cycle has few samples."""
+    """The running mean of a residual over about one cycle, shape (n,), rad; zero if a cycle has few samples."""
     step = float(reading.time[-1]) / (reading.time.size - 1)
     size = round(2.0 * np.pi / max(decay.omega_d * step, 2.0 * np.pi / residual.size))
     if not 2 <= size < residual.size // 2:
@@ -314,7 +316,7 @@ def _mean_over_a_cycle(residual: Array, reading: Reading, decay: Decay) -> Array
 
 
 def _spanning(value: Quantity, windows: Sequence[Quantity]) -> Quantity:
-    """A quantity of the run whose standard deviation includes its distance from the windows' values."""
+    """A quantity of the run with a standard deviation that includes its distance from the windows' values."""
     away = np.array([window.value for window in windows]) - value.value
     return Quantity(value.value, float(np.hypot(value.known_std, np.sqrt(np.mean(away**2)))), value.unit)
 
@@ -324,8 +326,9 @@ class ResidualCheck:
     """The verdict of the least-squares residual of a run.
 
     Args:
-        covariance: of (a, k) by least squares, widened where the model departs, shape (2, 2), in 1/s and 1/s².
-        colour: of the noise; None where it is white.
+        covariance: covariance of (a, k) by least squares, widened if the model departs, shape (2, 2), in 1/s
+            and 1/s².
+        colour: colour of the noise; None if it is white.
     """
 
     noise: NoiseLevel
@@ -338,7 +341,7 @@ class ResidualCheck:
         return self.noise.std * float(np.sqrt(self.noise.slow_ratio))
 
     def widened(self, covariance: Array) -> Array:
-        """A covariance of (a, k), shape (2, 2), raised to least squares' where the model departs."""
+        """A covariance of (a, k), shape (2, 2), raised to the least squares' covariance if the model departs."""
         if not self.noise.departs:
             return covariance
         return widened_covariance(covariance, np.sqrt(self.covariance.diagonal()))
@@ -347,7 +350,7 @@ class ResidualCheck:
 def residual_check(run: Run, decay: Decay, sensor: SensorProperties) -> ResidualCheck | None:
     """Fit a run by least squares, starting from a method's decay, and test the residual.
 
-    None where the least squares do not converge to a decay that the record determines.
+    None if the least squares do not converge to a decay that the record determines.
     """
     reading = Reading.from_record(run.record)
     fit = fit_from(run, reading, np.array([decay.rate, decay.stiffness]))
@@ -371,8 +374,8 @@ def fit_windows(
     window that one decay does not describe even roughly is skipped.
 
     Args:
-        zero: its sensor zero, rad.
-        cycles: periods in a window; None: three, or one where the record is too short for four such windows.
+        zero: sensor zero of the run, rad.
+        cycles: periods in a window; None: three, or one if the record is too short for four such windows.
     """
     if cycles is None:
         cycles = CYCLES if _LEAST_WINDOWS * _length(run, CYCLES) <= float(reading.time[-1]) else 1
@@ -463,7 +466,7 @@ def modal_quantities(decay: Decay, covariance: Array) -> tuple[Quantity, Quantit
     """ωn in rad/s and ζ with their standard deviations, of a decay of positive stiffness.
 
     Args:
-        covariance: of (a, k), shape (2, 2), in 1/s and 1/s².
+        covariance: covariance of (a, k), shape (2, 2), in 1/s and 1/s².
     """
     omega, zeta = decay.omega_n, decay.zeta
     slope = np.array([1.0 / omega, -0.5 * zeta / omega**2])

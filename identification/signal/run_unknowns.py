@@ -12,8 +12,8 @@ from identification.statistics import eliminate
 from tunnel_sim.vocabulary.quantities import Gain, Rad, RadPerS
 from tunnel_sim.vocabulary.record import Array
 
-# Local order of one run's unknowns throughout: decay rate, stiffness | zero (or constant acceleration) | initial
-# angle, initial rate | gain of its input, where it has one.
+# Local order of one run's unknowns throughout: decay rate, stiffness | zero (or constant acceleration) |
+# initial angle, initial rate | gain of its input, if it has one.
 RATE, STIFFNESS, ZERO, ANGLE, ANGULAR_RATE, GAIN = range(6)
 
 Zero: TypeAlias = Annotated[float, "rad, the sensor's; without a spring the constant acceleration, rad/s²"]
@@ -28,7 +28,7 @@ class RunUnknowns:
     Args:
         angle: initial angle from the sensor's zero, rad.
         rate: initial rate, rad/s.
-        gain: of its input; 0 where there is none.
+        gain: gain of the input; 0 without an input.
     """
 
     decay: Decay
@@ -55,7 +55,7 @@ class RunFit(RunUnknowns):
 
     @property
     def coefficients(self) -> list[int]:
-        """Places of a and k, and of the gain where there is one, in the local order."""
+        """Places of a and k, and of the gain if there is one, in the local order."""
         return [RATE, STIFFNESS, GAIN][: len(self.score) - 3]
 
     def reduced(self, zero: ZeroKind) -> tuple[Array, Array]:

@@ -1,7 +1,7 @@
 """The energy that a motion loses between successive reversals.
 
-At a reversal the body is at rest, and all its energy is potential. Between two reversals friction and
-damping take the work of the input less the gain in potential energy, whatever their laws; for free decays see
+At a reversal the body is at rest, and all its energy is potential. Between two reversals friction and damping
+dissipate the work of the input less the gain in potential energy, whatever their laws; for free decays see
 Feeny & Liang, J. Sound Vib. 195 (1996) 149, doi 10.1006/jsvi.1996.0411.
 """
 
@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from tunnel_sim.vocabulary.quantities import Angles
 from tunnel_sim.vocabulary.record import Array
 
-_WINDOW = 0.12  # of the time between reversals, on both sides of one: the motion is a parabola there
-_FEWEST = 2  # samples on either side
+_WINDOW = 0.12  # share of the time between reversals, on both sides of one: the motion is a parabola there
+_FEWEST = 2  # minimum number of samples on either side
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,8 +26,8 @@ class Strokes:
     Args:
         turns: indices of the reversals among the samples, shape (n + 1,).
         angle: at the reversals, rad, shape (n + 1,).
-        lost: energy that friction and damping have taken, J, shape (n,).
-        spread: standard deviation of those angles over a white-noise sample's, a ratio, shape (n + 1,).
+        lost: energy dissipated by friction and damping, J, shape (n,).
+        spread: standard deviation of these angles over a white-noise sample's, a ratio, shape (n + 1,).
     """
 
     turns: NDArray[np.int64]
@@ -47,7 +47,7 @@ def reversals(angle: Angles, least: float) -> NDArray[np.int64]:
     The ends of the record do not count: the body need not be at rest there.
 
     Args:
-        least: travel that makes a stroke, rad.
+        least: minimum travel of a stroke, rad.
     """
     places, low, high, upward = [], 0, 0, 0
     for place, value in enumerate(angle.tolist()):
@@ -72,11 +72,11 @@ def strokes(
     """The energy balance of every stroke.
 
     Args:
-        angle: at even times, rad, shape (n,).
-        turns: from `reversals`, of this motion or of a nearly equal one, shape (k,).
+        angle: angle at even times, rad, shape (n,).
+        turns: reversals of this motion or of a nearly equal one, from `reversals`, shape (k,).
         stiffness: of the restoring moment, N m/rad.
-        moment: of the input on the body at those times, N m, shape (n,); None: a free decay.
-        centre: the angle without restoring moment, rad.
+        moment: moment of the input on the body at those times, N m, shape (n,); None: a free decay.
+        centre: the angle at which the restoring moment is zero, rad.
 
     Returns:
         The strokes; the angles of the reversals are the extremes of parabolas through the samples around them.

@@ -1,4 +1,4 @@
-"""Natural frequency and damping from turning points, by their own likelihood.
+"""Natural frequency and damping from turning points, by the likelihood of the turning points.
 
 The turning points of a linear decay are half a damped period apart, about any centre, and their angles are
 c + (−1)ᵏ A exp(−δ k). A timing error changes the angle there only to second order. The likelihood is therefore a
@@ -26,7 +26,7 @@ class FittedNumber:
 
     Args:
         value: in the unit of the quantity.
-        std: its standard deviation, in the same unit.
+        std: standard deviation, in the same unit.
     """
 
     value: float
@@ -41,7 +41,7 @@ class TurningPointFit:
         omega_n: natural angular frequency, rad/s.
         zeta: damping ratio.
         period: of the damped oscillation, s.
-        decrement: logarithmic, of a whole period.
+        decrement: logarithmic decrement of a whole period.
         zero: angle at rest, rad.
         first_swing: excursion from ``zero`` at the first turning point, rad.
         remarks: sentences on the uncertainties, and on departures from the model.
@@ -103,7 +103,7 @@ class _Linear:
     def of(
         cls, columns: Array, values: Array, stated: Array | None, name: str, unit: str, said: list[str]
     ) -> _Linear:
-        """Fit; the errors follow from the scatter where none are stated, or where it exceeds them beyond chance."""
+        """Fit; the errors follow from the scatter if none are stated, or if it exceeds them beyond chance."""
         free = values.size - columns.shape[1]
         std = np.ones(values.size) if stated is None else stated
         solution = np.linalg.lstsq(columns / std[:, None], values / std, rcond=None)[0]
@@ -148,7 +148,7 @@ def _slopes(k: Array, at: Array) -> Array:
 
 def _decay(k: Array, angle: Array) -> tuple[Array, Array]:
     """Zero, first swing and decrement of half a period by least squares, and the fitted swings."""
-    from scipy.optimize import least_squares  # only here: slow to load
+    from scipy.optimize import least_squares  # imported here because it is slow to load
 
     middle = float(np.median(0.5 * (angle[1:] + angle[:-1])))
     size = np.abs(angle - middle)

@@ -132,7 +132,7 @@ def load_uncertainties(path: Path) -> InputUncertainties:
 
 Identify = Callable[[Campaign], Estimate]
 Progress = Callable[[str], None]
-_STEP = 1e-4  # relative, of an input whose influence on (a, k) is found by a finite difference
+_STEP = 1e-4  # relative change of an input for finding its influence on (a, k) by a finite difference
 _NAMES = (*PARAMETERS, "wind_off_inertia")
 # Exponents of a common scale of a stated input; the clock's is the scale of the time axis.
 _POWERS: Mapping[str, tuple[float, float, float, float, float]] = {
@@ -151,10 +151,11 @@ class Component:
     """One line of the budget.
 
     Args:
-        covariance: its contribution, shape (p, p), in the products of the quantities' units; a correlation may make
-            it negative.
-        note: why it is zero or unknown; otherwise empty.
-        known: whether it could be determined; if not, its covariance is zero and the total omits it.
+        covariance: contribution of the component, shape (p, p), in the products of the quantities' units; a
+            correlation may make it negative.
+        note: why the contribution is zero or unknown; otherwise empty.
+        known: whether the contribution could be determined; if not, its covariance is zero and the total omits
+            it.
     """
 
     name: str
@@ -169,7 +170,7 @@ class Budget:
     """The budget of an estimate, noise first.
 
     Args:
-        names: of p quantities: the estimate's parameters, and ``wind_off_inertia``.
+        names: names of p quantities: the estimate's parameters, and ``wind_off_inertia``.
     """
 
     names: tuple[str, ...]
@@ -191,7 +192,7 @@ class Budget:
         return float(component.covariance[place, place] / self.covariance[place, place])
 
     def to_json_dict(self) -> dict[str, Any]:
-        """Per quantity the combined standard uncertainty; per component the root of its variance, with its sign."""
+        """The combined standard uncertainty of each quantity, and for each component its signed deviation."""
         return {
             "combined_std": {name: self.std(name) for name in self.names},
             "components": [
@@ -279,7 +280,7 @@ def make_budget(
 
 
 def with_budget(estimate: Estimate, budget: Budget) -> Estimate:
-    """The estimate with combined standard uncertainties and covariance in place of the noise's."""
+    """The estimate with combined standard uncertainties and covariance instead of the noise's."""
     places = [budget.names.index(name) for name in estimate.parameters]
     total = budget.covariance[np.ix_(places, places)]
     quantities: dict[str, Any] = {
@@ -291,7 +292,7 @@ def with_budget(estimate: Estimate, budget: Budget) -> Estimate:
 def _individual(
     campaign: Campaign, budget: Budget, identify: Identify, inputs: InputUncertainties, progress: Progress
 ) -> list[Component]:
-    """An error of a single spring or run goes through the estimator itself, by one standard uncertainty.
+    """The contribution of an error of a single spring or run, with the input changed by one uncertainty.
 
     Kragten, Analyst 119 (1994) 2161–2165, doi 10.1039/AN9941902161.
     """
@@ -349,7 +350,7 @@ def _scatter(
 
 
 def _values(estimate: Estimate, budget: Budget) -> Array | None:
-    """The budget's quantities of another estimate; None where one is missing."""
+    """The budget's quantities in another estimate; None if one is missing."""
     found: list[Quantity | None] = [getattr(estimate, name) for name in budget.names]
     given = [quantity.value for quantity in found if quantity is not None]
     return np.array(given) if len(given) == len(found) else None

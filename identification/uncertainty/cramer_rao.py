@@ -37,12 +37,12 @@ class SinusoidBound:
     """Smallest standard deviations of any unbiased estimator of one damped sinusoid.
 
     Args:
-        amplitude: of the envelope at the first sample, rad.
-        phase: at the first sample, rad.
+        amplitude: amplitude of the envelope at the first sample, rad.
+        phase: phase at the first sample, rad.
         frequency: damped frequency, Hz.
         omega_n: natural angular frequency, rad/s.
         zeta: damping ratio.
-        offset: rad; 0 where it is known.
+        offset: offset, rad; 0 if it is known.
     """
 
     amplitude: float
@@ -109,7 +109,7 @@ def damped_sinusoid_bound(
 
 @dataclass(frozen=True)
 class CampaignBound:
-    """The bound of a campaign's common parameters, every run's initial state and the zero unknown.
+    """The bound of a campaign's common parameters, with every run's initial state and the zero unknown.
 
     The zero is common to the runs, unless a run has no spring.
 
@@ -138,11 +138,11 @@ def campaign_bound(
     random_moments: Sequence[float] | None = None,
     repeatability: Repeatability | None = None,
 ) -> CampaignBound:
-    """The bound of Cnβ, Cnr, Izz and Cr together, from free and driven runs; an input is exact between its samples.
+    """The bound of Cnβ, Cnr, Izz and Cr together, from free and driven runs with exactly known inputs.
 
     Args:
         campaign: conditions, inputs and sample times; the readings themselves are not used.
-        noise_std: of the reading, quantisation included (add resolution²/12 to the variance), rad.
+        noise_std: noise of the reading, quantisation included (add resolution²/12 to the variance), rad.
         drive_gain: true gain of inputs that state none, unknown to the estimator, N m per unit.
         initial_states: angle [rad] and rate [rad/s] at each run's first sample; None: the runs' nominal release
             angles at rest, and 0 for driven runs.
@@ -205,7 +205,7 @@ def campaign_bound(
         decay, gain = reading.forcing.at(link @ values)
         rows = reading.forcing.rows(reading.time, decay)
         if filters is not None:
-            from scipy.signal import lfilter  # only here: slow to load
+            from scipy.signal import lfilter  # imported here because it is slow to load
 
             rows = np.asarray(lfilter(*filters[i], rows, axis=1))
         fits.append(
@@ -226,7 +226,7 @@ def campaign_bound(
 def _with_deviations(
     runs: Sequence[Run], linked: Design, parameters: Array, repeatability: Repeatability | None
 ) -> tuple[list[Array], Array]:
-    """The links with every run's deviations appended to φ, and the inverse variances of these, shape (d,).
+    """The links with every run's deviations appended to φ, and the inverse variances of the deviations, shape (d,).
 
     The deviations count as unknowns with their prior as information; eliminating them gives the information of the
     marginal distribution (Woodbury's identity).

@@ -34,11 +34,11 @@ from tunnel_sim.vocabulary.rig import Rig
 Goal = Literal["d", "cn_r"]
 """The determinant of the covariance of (Cnβ, Cnr), or the variance of Cnr."""
 
-_PER_CYCLE = 8.0  # samples while inputs are compared
-_STEPS = (0.16, 0.08, 0.04, 0.02, 0.01)  # relative, of an end of the band
-_WIDER = 1.1  # ratio of an end to the outermost resonance, where the search starts
+_PER_CYCLE = 8.0  # samples per cycle while inputs are compared
+_STEPS = (0.16, 0.08, 0.04, 0.02, 0.01)  # relative steps of an end of the band
+_WIDER = 1.1  # ratio of an end to the outermost resonance at the start of the search
 _BROAD = 2.0  # ratio of an end of a plain broad band to the outermost resonance
-_DIGITS = 3  # of an amplitude and a frequency in the plan
+_DIGITS = 3  # digits of an amplitude and a frequency in the plan
 
 
 @dataclass(frozen=True)
@@ -46,8 +46,8 @@ class Limits:
     """The limits of the rig.
 
     Args:
-        moment: peak of the input, N m.
-        angle: peak of the response from rest, rad.
+        moment: maximum of the input, N m.
+        angle: maximum of the response from rest, rad.
     """
 
     moment: float
@@ -55,13 +55,13 @@ class Limits:
 
 
 def plan_bound(plan: CampaignPlan, rig: Rig) -> CampaignBound:
-    """The bound of a plan's coefficients at its truth, of free decays and driven runs.
+    """The bound of a plan's coefficients at its truth, from free decays and driven runs.
 
-    Only random moments of a broad spectrum count among its effects; each is taken as white with its intensity at a
-    run's natural frequency.
+    Only random moments with a broad spectrum count among the plan's effects; each is taken as white, with its
+    intensity at a run's natural frequency.
 
     Raises:
-        TunnelError: where the runs do not determine Cnβ and Cnr, or the readings have no noise.
+        TunnelError: when the runs do not determine Cnβ and Cnr, or the readings have no noise.
     """
     sensor = plan.sensor
     noise = _noise(sensor)
@@ -78,7 +78,7 @@ def plan_bound(plan: CampaignPlan, rig: Rig) -> CampaignBound:
     campaign = Campaign(plan.name, RigProperties.of(rig), SensorProperties.of(sensor), runs)
     moments = None  # spectral intensity over the inertia at the natural frequency of each run, rad²/s³
     if plan.effects:
-        from tunnel_sim.effects import effect_from  # only here: most plans have none
+        from tunnel_sim.effects import effect_from  # imported here because most plans do not need it
         from tunnel_sim.effects.capabilities import AtRandom
 
         effects = [effect_from(setting.name, setting.parameters) for setting in plan.effects]
@@ -112,7 +112,7 @@ def peak_response(plan: CampaignPlan, rig: Rig) -> float:
     """The largest angle of the driven runs of a plan at its truth, rad.
 
     Raises:
-        TunnelError: where the motion of a run diverges.
+        TunnelError: when the motion of a run diverges.
     """
     peak = 0.0
     inertia = plan.truth.yaw_inertia
@@ -134,10 +134,10 @@ def peak_response(plan: CampaignPlan, rig: Rig) -> float:
 
 
 def driven_plan(document: PlanDocument, drive: InputTable, duration: float) -> PlanDocument:
-    """A plan with one driven run of each spring and speed in place of its free decays.
+    """A plan with one driven run for each spring and speed instead of its free decays.
 
     Args:
-        duration: of each record, s.
+        duration: duration of each record, s.
     """
     return document.model_copy(
         update={"release_angles_deg": [], "repeats": 1, "duration": duration, "drive": drive}
@@ -150,7 +150,7 @@ def within_limits(
     """The driven plan with the largest input that the limits allow.
 
     Args:
-        duration: of each record, s.
+        duration: duration of each record, s.
     """
     unit = driven_plan(document, drive.model_copy(update={"amplitudes_nm": [1.0]}), duration)
     plan = plan_from(unit, rig, document.name)
@@ -172,12 +172,12 @@ def propose_drive(
     """The driven plan, of one run for each spring and speed, with the lowest bound that the search finds.
 
     A stepped sine begins at the resonances, and frequencies are removed as long as the bound falls. Its
-    frequencies, and the ends of a multisine and a chirp, are then changed one at a time. The best of these, of
-    sines at the resonances and of a broad multisine is chosen.
+    frequencies, and the ends of a multisine and a chirp, are then changed one at a time. The result is the best
+    of these, of sines at the resonances and of a broad multisine.
 
     Args:
-        document: of free decays; its conditions, sensor and truth are kept.
-        duration: of each record, s; None: the plan's.
+        document: plan of free decays; its conditions, sensor and truth are kept.
+        duration: duration of each record, s; None: the plan's.
 
     Raises:
         TunnelError: as `plan_bound` and `peak_response`.
@@ -224,7 +224,7 @@ def propose_drive(
         _band("multisine")([outer[0] / _BROAD, outer[1] * _BROAD]),
         *(_moved(_band(k), [outer[0] / _WIDER, outer[1] * _WIDER], score) for k in ("multisine", "chirp")),
     ]
-    rates = resonances  # of a stepped sine, Hz; time may be better spent on fewer
+    rates = resonances  # frequencies of a stepped sine, Hz; time may be better spent on fewer
     while len(rates) > 1:
         shorter = min(
             ([*rates[:i], *rates[i + 1 :]] for i in range(len(rates))), key=lambda left: score(_stepped(left))

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from tunnel_sim.files.importing.tables import Channel, Table
 
 MOST_COLUMNS = 8
-"""At most this many raw columns are drawn."""
+"""Maximum number of raw columns drawn."""
 READINGS = ("angle", "counts", "voltage", "rate", "acceleration")
-"""Kinds of unit that a reading may have."""
+"""Kinds of units that a reading may have."""
 Role = Literal["time", "angle", "condition", "input"]
 
 
@@ -41,7 +41,7 @@ def raw_columns(session: Session) -> list[tuple[str, str, list[float], list[floa
     """The columns of the first readable table, unchanged.
 
     Returns:
-        Name, unit (if stated), row numbers and values of each numeric column; few enough to draw.
+        Name, unit (if stated), row numbers and values of each numeric column; as many columns as can be drawn.
     """
     import numpy as np
 
@@ -57,7 +57,7 @@ def raw_columns(session: Session) -> list[tuple[str, str, list[float], list[floa
 
 
 def column_names(session: Session) -> list[str]:
-    """Names of the columns in the dropped files; empty where a file cannot be read."""
+    """Names of the columns in the dropped files; empty if a file cannot be read."""
     found = list(_tables(session))
     if len(found) < len(files_of(session)):
         return []
@@ -78,7 +78,7 @@ class Column:
 
     @property
     def units(self) -> list[str]:
-        """The units that the user can state for it; none where only the file can state the unit."""
+        """The units that the user can state for the column; none if only the file can state the unit."""
         from tunnel_sim.files.importing.units import UNITS
         from tunnel_sim.vocabulary.freedom import DISPLACEMENT
 
@@ -87,7 +87,7 @@ class Column:
         return [unit for units in (*(UNITS[kind] for kind in kinds), *own) for unit in units]
 
     def stating(self, unit: str | None) -> dict[str, Any]:
-        """The choices that state one of its `units`; an unused column is thereby chosen."""
+        """The choices that state one of the column's `units`; an unused column is thereby chosen."""
         key = "time_unit" if self.role == "time" else "unit"
         if self.used or unit is None:
             return {key: unit}
@@ -161,7 +161,7 @@ def show_columns(columns: list[Column], state: Callable[[dict[str, Any]], Awaita
             source, use = column.source, "not read; a unit chosen here makes it the angle"
             if column.used:
                 use = {"time": "read as the times", "angle": "read as the angle"}.get(column.role, "")
-            elif column.unit:  # the field is empty, so that this unit can be chosen too
+            elif column.unit:  # the field is empty, so that this unit can be chosen as well
                 source = f"{column.unit}, {source}"
             value = column.unit if column.used and column.unit else None
             label = f"Unit of {column.name}"

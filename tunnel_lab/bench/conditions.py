@@ -25,7 +25,7 @@ from tunnel_sim.vocabulary.freedom import ANGLE, FREEDOMS, Freedom
 from tunnel_sim.vocabulary.inputs import without_spring_needs_input
 
 Cells = dict[str, dict[str, str]]
-"""Texts by run and key; the rig's under `RIG`."""
+"""Texts by run and key; the rig's texts under `RIG`."""
 Words = dict[tuple[str, str], str]
 """Faults by row and key: one line for each cell."""
 RIG = ""
@@ -40,7 +40,7 @@ _OF_JOINT = "0 for a joint without a spring"
 """The stiffness of a driven run in still air."""
 _DENSITY = "air_density"
 _MOST_ROWS = 20  # in a table without a scroll bar
-_MOST_LINES = 8  # listed faults
+_MOST_LINES = 8  # maximum number of listed faults
 _PASTE = """(event) => {
   const api = getElement(event.currentTarget.id.slice(1)).api;
   const cell = api.getFocusedCell();
@@ -67,7 +67,7 @@ def freedom_in(document: Mapping[str, Any]) -> Freedom:
 
 
 def typed(session: Session) -> Cells:
-    """The conditions as last typed, saved in the campaign or not."""
+    """The conditions as last typed, whether saved in the campaign or not."""
     saved = stated(session)
     if not session.draft.is_file():
         return saved
@@ -109,7 +109,7 @@ def faults(cells: Cells, *, plausible: bool) -> Words:
 
 
 def number(text: str, where: str) -> float | None:
-    """The number in a cell, with a decimal point or comma; None where it is empty."""
+    """The number in a cell, with a decimal point or comma; None if the cell is empty."""
     if not text.strip():
         return None
     try:
@@ -205,7 +205,7 @@ def restore(
 
 
 def pasted(cells: Cells, columns: list[str], row: str, key: str, text: str) -> Cells:
-    """Cells with a block from a spreadsheet inserted, its upper left cell at ``row`` and ``key``.
+    """The cells after a block from a spreadsheet is inserted, its upper left cell at ``row`` and ``key``.
 
     The block has rows on lines and cells separated by tabs; cells outside the table are left out.
     """

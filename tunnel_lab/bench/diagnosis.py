@@ -50,7 +50,7 @@ STOPPED = 130
 _FIRST = (("where",), ("which", "found"), ("coefficients-section", "uncertainty"))
 """Sections below the figures, in groups side by side; the others are folded."""
 _ELSEWHERE = ("answer", "fit", "place", "closes", "next")
-"""Sections that the page shows in another way, or another page."""
+"""Sections that the page shows in another way, or that another page shows."""
 _AFTER_STOP = "; a stopped diagnosis starts again from the beginning, a paused one continues where it was"
 _BEFORE = (
     "It compares sets of effects with the runs: half a minute to several minutes, also with this page closed."
@@ -67,7 +67,7 @@ _NO_SPRING = "no run can be planned without a stated spring"
 
 
 class DiagnosePage:
-    """The page: it follows the log of the command, wherever that was started."""
+    """The page: it follows the log of the command, wherever the command was started."""
 
     def __init__(self, session: Session, frame: Frame) -> None:
         self._session, self._frame = session, frame
@@ -176,7 +176,7 @@ class DiagnosisProgress:
 
     Args:
         stages: time (s since the start, as printed) and name of each stage that has begun.
-        tried: the set of effects being tried, in words; empty for none.
+        tried: the current set of effects, in words; empty for none.
         reached: the last stage.
         seconds: time of the last line, s since the start.
     """
@@ -250,7 +250,7 @@ class ShownAnswer:
             return
         with self._figures:
             for figure in figures:
-                ui.html(figure, sanitize=False, tag="figure")  # drawn by this program with escaped texts
+                ui.html(figure, sanitize=False, tag="figure")  # drawn by this program, with escaped texts
 
 
 class ByHandPart:
@@ -338,7 +338,7 @@ def build_next_run(session: Session, frame: Frame) -> None:
     from diagnosis.findings.next_steps import next_steps, rival_lines, run_to_make, unplannable
 
     answer = read_diagnosis(session)
-    assert answer is not None  # else the stage is closed
+    assert answer is not None  # otherwise the stage is closed
     heading("What to do next")
     with ui.element("ol"):
         show_items(answer.freedom.texts(list(next_steps(answer)), answer.names))
@@ -491,7 +491,7 @@ def write_session_report(session: Session, author: str, notes: str) -> None:
     from tunnel_sim.files.campaign_folder import read_campaign
 
     answer = read_diagnosis(session)
-    assert answer is not None  # else the stage is closed
+    assert answer is not None  # otherwise the stage is closed
     made = datetime.fromtimestamp(session.diagnosis.stat().st_mtime).astimezone().date().isoformat()
     given = read_campaign(session.campaign).without(left_out_of(answer))
     campaign = diagnosable(given).campaign

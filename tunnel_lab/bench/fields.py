@@ -18,10 +18,10 @@ Changed = Callable[[str, Any], Awaitable[None]]
 def field_of(
     model: type[BaseModel], key: str, value: Any, changed: Changed, options: Sequence[str] | None = None
 ) -> ui.element:
-    """A field that calls back with its key and new value; an emptied one with the default of the model.
+    """A field that calls back with its key and new value; an emptied field calls back with the model's default.
 
     Args:
-        options: values to choose from, where the model accepts any text.
+        options: values to choose from, if the model accepts any text.
     """
     info, label = model.model_fields[key], label_of(model, key)
     kind = _kind(info.annotation)

@@ -169,7 +169,7 @@ def side_by_side(documents: Sequence[Document]) -> list[Block]:
         (f"{SYMBOLS[name]} {unit(UNITS[name])}", *(quantity_text(document[name]) for document in documents))
         for name in given
     )
-    estimators: dict[str, list[str]] = {}  # by their notes
+    estimators: dict[str, list[str]] = {}  # estimators by their notes
     for document in documents:
         for line in notes(document):
             estimators.setdefault(line, []).append(document["estimator"])

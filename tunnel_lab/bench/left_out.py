@@ -32,10 +32,10 @@ def left_out_of(answer: Diagnosis) -> tuple[str, ...]:
 
 
 def build_choice(session: Session, changed: Callable[[], None]) -> None:
-    """Build the field; all but one run can be chosen.
+    """Build the field; at most all runs but one can be chosen.
 
     Args:
-        changed: called after a choice is written.
+        changed: function called after a choice is written.
     """
     ids = _ids(session)
     if len(ids) < 2:

@@ -32,13 +32,13 @@ _HEAD = """
 
 
 def page_words(text: str) -> str:
-    """A line of a command with the names of fields in place of options, and without the command's name."""
+    """A line of a command in the words of the page: fields replace options, and the command's name is omitted."""
     plain = text.removeprefix("tunnel: ").replace("with --no-cut", "by switching off --no-cut")
     return _OPTION.sub(_field, plain)
 
 
 def asked_in(text: str) -> list[str]:
-    """The choices, as names of fields of `ImportChoices`, that a line of a command asks for."""
+    """The fields of `ImportChoices` for which a line of a command asks, by name."""
     keys = _choices()
     return list(dict.fromkeys(keys[option] for option, _ in _OPTION.findall(text) if option in keys))
 
@@ -66,7 +66,7 @@ def _field(found: re.Match[str]) -> str:
 
 @cache
 def _choices() -> dict[str, str]:
-    """The fields of `ImportChoices` by the option of ``tunnel import`` that fills them."""
+    """The fields of `ImportChoices` by the option of ``tunnel import`` that fills each field."""
     from tunnel_sim.files.importing.choices import ImportChoices
 
     options = {key: key.replace("_", "-") for key in ImportChoices.model_fields}
@@ -79,13 +79,13 @@ def address(session: Session, stage: str) -> str:
 
 
 class Frame:
-    """The head of a page: the current stage, and the open stages of the session; without a session, neither."""
+    """The head of a page: the current stage, and the open stages of the session; neither without a session."""
 
     def __init__(self, title: str, session: Session | None = None, stage: str = "") -> None:
         self._session, self._stage = session, stage
         ui.add_head_html(_HEAD)
         ui.colors(primary="var(--link)")
-        ui.dark_mode(None)  # follows the browser
+        ui.dark_mode(None)  # follow the browser's theme
         ui.page_title(f"{title} · {session.name}" if session else title)
         with ui.element("header").classes("top"):
             ui.link("Skip to the page", "#main").classes("skip")
@@ -121,7 +121,7 @@ class Frame:
                 self.way_on()
 
     def way_on(self) -> None:
-        """Links to the next and the final stage, where they are open, or what the next one waits for."""
+        """Links to the next and the final stage if they are open, or the reason why the next stage is closed."""
         assert self._session is not None
         keys = [stage.key for stage in STAGES]
         after = keys.index(self._stage) + 1
@@ -168,7 +168,7 @@ def show_blocks(blocks: Iterable[Block]) -> None:
     """Blocks without figures and details."""
     ui.html(f"<div>{as_html(brief(blocks))}</div>", sanitize=False).classes(
         "printed"
-    )  # its texts are escaped
+    )  # the texts are escaped
 
 
 def show_facts(facts: Iterable[tuple[str, ...]]) -> None:
@@ -217,12 +217,14 @@ class Chart(ui.element, component="static/chart.js"):
     """The chart.
 
     Args:
-        title: of the chart, also for a screen reader.
+        title: title of the chart, also for a screen reader.
         series: labels of the curves and the names of their colours (``before``, ``after``, ``soft``, …).
         data: abscissas and the ordinates of every curve; None is a gap.
-        moved: called with the id of a mark and its new position, in the unit of its axis; may be awaitable.
-        added: called with the abscissa of a release to add, the middle of the visible part; None: no button.
-        removed: called with the id of a mark on which Delete is pressed.
+        moved: function called with the id of a mark and its new position, in the unit of its axis; may be
+            awaitable.
+        added: function called with the abscissa of a release to add, the middle of the visible part; None: no
+            button.
+        removed: function called with the id of a mark on which Delete is pressed.
     """
 
     def __init__(
@@ -250,7 +252,7 @@ class Chart(ui.element, component="static/chart.js"):
             self.on("removed", lambda event: removed(str(event.args["id"])))
 
     def show(self, data: Sequence[Sequence[float | None]]) -> None:
-        """Show other curves of the same labels."""
+        """Show other curves with the same labels."""
         self._props["data"] = data
         self.update()
 
@@ -259,8 +261,9 @@ class Chart(ui.element, component="static/chart.js"):
 
         Args:
             focus: id of the mark that takes the focus; empty: none.
-            marks: ``id``, ``label``, ``kind``, ``at`` and its ``unit`` of each. A ``start`` or an ``end`` is on the
-                abscissa. A ``rest`` is on the ordinate, drawn from ``from`` to ``to`` with the text ``about``.
+            marks: ``id``, ``label``, ``kind``, ``at`` and its ``unit`` for each mark. A ``start`` or an ``end``
+                is on the abscissa. A ``rest`` is on the ordinate, drawn from ``from`` to ``to`` with the text
+                ``about``.
         """
         self._props.update(marks=[dict(mark) for mark in marks], focus=focus)
         self.update()

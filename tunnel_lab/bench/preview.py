@@ -29,14 +29,14 @@ if TYPE_CHECKING:
 
 
 MOST_RECORDS = 24
-"""At most this many records are drawn."""
+"""Maximum number of records drawn."""
 CORRECTIONS = tuple(
     key for key in ImportChoices.model_fields if key not in ("leave_out", "stretches", "stated_by")
 )
-"""The choices with a field; the others are made in the charts, and by leaving out."""
+"""The choices with a field; the others are made in the charts, and by leaving runs out."""
 LEFT_OUT = "left out as stated"
 """The remark of the importer on a run that the user leaves out."""
-_STILL = 0.01  # of the range of a run's readings: a smaller range looks flat
+_STILL = 0.01  # share of the range of a run's readings: a smaller range looks flat
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,13 +44,13 @@ class Mark:
     """A run in the chart of its record; times by the file's clock.
 
     Args:
-        start: of the run: the release, s.
-        end: where the run has come to rest, or the next run begins, s.
+        start: start of the run (the release), s.
+        end: time at which the run has come to rest or the next run begins, s.
         rest: the reading at rest, in the reading's unit.
-        about: the source of ``rest`` in words: its uncertainty, or that it is stated.
-        fault: the reason for leaving the run out; empty where it is used.
-        doubts: for the user to judge, in one line each; empty where the run looks like a free decay.
-        added: whether the user has added it.
+        about: the source of ``rest`` in words, with its uncertainty; or that the user has stated it.
+        fault: the reason for leaving the run out; empty if it is used.
+        doubts: doubts for the user to judge, in one line each; empty if the run looks like a free decay.
+        added: whether the user has added the run.
     """
 
     run: str
@@ -65,7 +65,7 @@ class Mark:
 
     @property
     def is_left_out(self) -> bool:
-        """Whether the user has left it out."""
+        """Whether the user has left the run out."""
         return self.fault == LEFT_OUT
 
 
@@ -74,7 +74,7 @@ class DrawnRecord:
     """A record as it is drawn: the time in s, and the reading in its unit, None within a gap.
 
     Args:
-        cut: whether releases can be added: it is neither driven nor kept whole.
+        cut: whether releases can be added: the record is neither driven nor kept whole.
     """
 
     title: str
@@ -87,7 +87,7 @@ class DrawnRecord:
 
     @property
     def key(self) -> str:
-        """Its file and its name."""
+        """File and name of the record."""
         return f"{self.file}/{self.title}"
 
 
@@ -116,7 +116,7 @@ def state(session: Session, changes: Mapping[str, Any]) -> None:
 
 
 def settings_of(choices: ImportChoices) -> str:
-    """The conditions that are stated for all runs, as ``--set`` takes them."""
+    """The conditions that are stated for all runs, in the format of ``--set``."""
     numbers = choices.conditions.model_dump(exclude_none=True)
     names = choices.stated_by.model_dump(exclude_none=True)
     stated = [f"{key}={text_of(value)}" for key, value in numbers.items()]
@@ -145,7 +145,7 @@ def move(session: Session, mark: Mark, places: Mapping[str, float | None]) -> No
 
     Args:
         places: ``start`` and ``end`` in s by the file's clock, ``rest`` in the reading's unit;
-            None: as found.
+        None: as detected.
 
     Raises:
         TunnelError: when the end is not after the start.
@@ -166,7 +166,7 @@ def move(session: Session, mark: Mark, places: Mapping[str, float | None]) -> No
 
 
 def add(session: Session, record: DrawnRecord, at: float) -> str:
-    """Add a run that is released at a time of its record, s by the file's clock.
+    """Add a run with its release at a time of its record, s by the file's clock.
 
     Returns:
         Name of the run.
@@ -183,7 +183,7 @@ def add(session: Session, record: DrawnRecord, at: float) -> str:
 
 
 def remove(session: Session, mark: Mark) -> None:
-    """Remove an added run with its release, or leave a found one out."""
+    """Remove an added run with its release, or leave out a detected run."""
     choices = choices_of(session)
     if mark.added:
         kept = [one for one in choices.stretches if (one.file, one.run) != (mark.file, mark.run)]
@@ -204,8 +204,8 @@ def read(session: Session) -> tuple[Imported, tuple[TunnelError, ...]]:
         The import, and the faults of the unreadable files.
 
     Raises:
-        TunnelError: for the first fault, as from ``tunnel import``, where no file can be read, or where a missing
-            condition can be stated only by the user.
+        TunnelError: for the first fault, as from ``tunnel import``, if no file can be read, or if only the user
+            can state a missing condition.
     """
     from tunnel_sim.files.importing.conditions import Unstated
     from tunnel_sim.files.importing.records import read_records
@@ -237,7 +237,7 @@ def leave_out(session: Session, names: Sequence[str]) -> None:
     """State which files and runs are left out.
 
     Raises:
-        TunnelError: when there is no file or run of a name.
+        TunnelError: when no file or run has a given name.
     """
     state(session, {"leave_out": tuple(names)})
 
@@ -246,7 +246,7 @@ def drawn(imported: Imported, order: Sequence[str] = ()) -> list[DrawnRecord]:
     """The first records, with their runs; records with a run to judge come first.
 
     Args:
-        order: keys of the records that are drawn already, which keep their places.
+        order: keys of the records that are already drawn; these keep their places.
     """
     stretches, unit = imported.choices.stretches, imported.campaign.sensor.unit
     added = {(one.file, one.run) for one in stretches if one.record is not None}
@@ -277,7 +277,7 @@ def drawn(imported: Imported, order: Sequence[str] = ()) -> list[DrawnRecord]:
 
 
 def doubts_of(part: ImportedRun) -> tuple[str, ...]:
-    """The doubts about the motion of a run for the user to judge, one line each, as the import states them."""
+    """The doubts about the motion of a run for the user to judge, one line each, as stated by the import."""
     if part.run is None:
         return () if part.remarks[-1] == LEFT_OUT else (part.remarks[-1],)
     return tuple(
@@ -286,11 +286,11 @@ def doubts_of(part: ImportedRun) -> tuple[str, ...]:
 
 
 def points(time: Array, reading: Array) -> tuple[list[float], list[float | None]]:
-    """The curve of a record for a chart, few enough points to draw; None within a gap.
+    """The curve of a record for a chart, with few enough points to draw; None within a gap.
 
     Args:
-        time: shape (n,), s.
-        reading: shape (n,).
+        time: times, shape (n,), s.
+        reading: readings, shape (n,).
     """
     from tunnel_lab.plotting.runs import thinned
 
@@ -299,7 +299,7 @@ def points(time: Array, reading: Array) -> tuple[list[float], list[float | None]
 
 
 def _rest(part: ImportedRun, unit: str) -> tuple[float, str]:
-    """The reading at rest, and its source in words: as stated, the oscillation's centre, or the run's end."""
+    """The reading at rest, and its source in words: a statement, the oscillation's centre, or the run's end."""
     import numpy as np
 
     from identification.examination.free_motion import centre_of
@@ -319,7 +319,7 @@ def _rest(part: ImportedRun, unit: str) -> tuple[float, str]:
 
 
 def choices_to_show(session: Session, asked: str) -> list[str]:
-    """The choices, as fields of `ImportChoices`, that a fault asks for, or that the user has stated."""
+    """The choices, as fields of `ImportChoices`, for which a fault asks, or that the user has stated."""
     stated = choices_of(session).model_fields_set | (
         {"conditions"} if settings_of(choices_of(session)) else set()
     )

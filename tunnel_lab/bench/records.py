@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 _TIME = "time of the file [s]"
-_MOST_NAMES = 8  # of runs, in a line
+_MOST_NAMES = 8  # maximum number of runs in a line
 _KINDS = {"start": "release", "end": "end", "rest": "rest"}
 _HELP = (
     "Drag a mark, or move it with the arrow keys, to where a run is released (circle) or ends (square), and the "
@@ -104,10 +104,10 @@ class RecordsPage:
         await self._read()
 
     def _show_choices(self, asked: str) -> None:
-        """The fields that a fault asks for, the stated fields, and the others folded."""
+        """The fields for which a fault asks, the stated fields, and the others folded."""
         keys = preview.choices_to_show(self._session, asked)
         if keys == self._shown_choices:
-            return  # the field that is being filled keeps the focus
+            return  # the field that the user is filling keeps the focus
         self._shown_choices = keys
         self._asked.clear()
         with self._asked:
@@ -160,7 +160,7 @@ class RecordsPage:
         await self._cut(add)
 
     async def _cut(self, change: Callable[[], None]) -> None:
-        """Change the runs of a record; nothing changes where the files cannot be read with it."""
+        """Change the runs of a record; nothing changes if the files cannot be read with the change."""
         with self._fault.around():
             before = preview.choices_of(self._session)
             try:
@@ -173,7 +173,7 @@ class RecordsPage:
             await self._read()
 
     async def _moved(self, mark: preview.Mark, kind: str, at: float | None) -> None:
-        """Save the new position of a mark; it moves back if the files cannot be read with it."""
+        """Save the new position of a mark; the mark moves back if the files cannot be read with it."""
         with self._fault.around():
             before = preview.choices_of(self._session).stretch_of(mark.file, mark.run)
             preview.move(self._session, mark, {kind: at})
@@ -184,10 +184,10 @@ class RecordsPage:
             self._draw(self._imported)
 
     async def _read(self, *, redraw: bool = True) -> bool:
-        """Read the files with the current choices; the charts are not redrawn where only a mark was moved.
+        """Read the files with the current choices; the charts are not redrawn if only a mark was moved.
 
         Returns:
-            False where the files cannot be read.
+            False if the files cannot be read.
         """
         self._reading += 1
         mine = self._reading
@@ -264,7 +264,7 @@ class RecordsPage:
                 drop_zone(more(self._session), kept, Fault())
 
     def _draw(self, imported: Imported) -> None:
-        """Draw the records, or only their marks where the records are already drawn."""
+        """Draw the records, or only their marks if the records are already drawn."""
         doubtful = [part.id for part in imported.parts if preview.doubts_of(part)]
         more = f" and {len(doubtful) - _MOST_NAMES} more" if len(doubtful) > _MOST_NAMES else ""
         self._judged.set_text(f"To judge, below: {', '.join(doubtful[:_MOST_NAMES])}{more}")
@@ -314,7 +314,7 @@ class RecordsPage:
             field.update()
 
     async def _rest_typed(self, mark: preview.Mark, field: ui.number) -> None:
-        """Save a reading at rest; where the field is emptied, it is detected again."""
+        """Save a reading at rest; if the field is emptied, the reading at rest is detected again."""
         await self._moved(mark, "rest", field.value)
 
     def _record(self, record: preview.DrawnRecord) -> Chart:
@@ -359,7 +359,7 @@ class RecordsPage:
 def write(session: Session, imported: Imported) -> None:
     """Write the campaign, as ``tunnel import`` does; conditions stated earlier are kept.
 
-    Conditions that a campaign takes only with an air density stay in the draft until that is stated.
+    Conditions that a campaign takes only with an air density stay in the draft until the density is stated.
 
     Raises:
         TunnelError: when the folder cannot be written.

@@ -43,19 +43,19 @@ _PAGE = """<!doctype html>
 
 
 def add_refusals(app: FastAPI) -> None:
-    """Answer errors by `refusal`, also where NiceGUI has its own reply."""
+    """Answer errors by `refusal`, even if NiceGUI has its own reply."""
     for kind in (HTTPException, HTTPStatus.NOT_FOUND.value, TunnelError, OSError):
         app.add_exception_handler(kind, refusal)
 
 
 def refusal(request: Request, error: Exception) -> Response:
-    """A page for a browser that asked for one, a line of text otherwise."""
+    """A page for a browser that asks for HTML, otherwise a line of text."""
     status, headers = status_of(error), None
     if isinstance(error, HTTPException):
         words, headers = _WORDS.get(status, f"{error.detail}"), error.headers
     elif status == HTTPStatus.INSUFFICIENT_STORAGE:
         words = "The disk is full: nothing was kept. Free some space, and try again."
-    elif isinstance(error, OSError):  # its text may disclose the name of a file
+    elif isinstance(error, OSError):  # the text may disclose the name of a file
         words = f"A file cannot be read or written ({(error.strerror or type(error).__name__).lower()})."
     else:
         words = page_words(str(error))
@@ -66,7 +66,7 @@ def refusal(request: Request, error: Exception) -> Response:
 
 
 def status_of(error: BaseException) -> HTTPStatus:
-    """The HTTP status for an error; errors of the present files are a conflict."""
+    """The HTTP status for an error; errors due to the present files are a conflict."""
     if isinstance(error, HTTPException):
         return HTTPStatus(error.status_code)
     if isinstance(error, UnknownCampaign):
@@ -92,7 +92,7 @@ def _in_one_line(record: logging.LogRecord) -> bool:
 
 
 def _say_odd_message(loop: asyncio.AbstractEventLoop, context: Mapping[str, Any]) -> None:
-    """Report an error in a task of the websocket library in one line; any other is a fault of the bench."""
+    """Report an error in a task of the websocket library in one line; any other error is a fault of the bench."""
     task, error = context.get("future"), context.get("exception")
     code = getattr(task.get_coro(), "cr_code", None) if isinstance(task, asyncio.Task) else None
     if (

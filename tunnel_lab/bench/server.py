@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 HOST = "127.0.0.1"
 _OTHERS_MASK = 0o077
-"""Permissions removed from files and folders that the bench and its commands write: all of other users."""
+"""Permissions removed from files and folders that the bench and its commands write: all those of other users."""
 _CONFLICT = 409  # HTTP status of requests that the present files do not allow
 _LENGTH = re.compile(r"[0-9]{1,20}")
 
@@ -129,7 +129,7 @@ class Guard:
         elif "token" in query and scope["type"] == "http" and scope["method"] == "GET":
             # The token moves from the address into a cookie, to keep it out of histories and bookmarks.
             rest = urlencode({name: value for name, value in query.items() if name != "token"})
-            # The path cannot name another host or end the header.
+            # the path cannot name another host or end the header
             path = "/" + quote(scope["path"].lstrip("/\\"), errors="replace")
             place = path + (f"?{rest}" if rest else "")
             cookie = f"{self._cookie}={self._token}; HttpOnly; SameSite=Strict; Path=/"
@@ -138,7 +138,7 @@ class Guard:
             await self._app(scope, receive, send)
 
     def _refusal(self, headers: Mapping[str, str], query: Mapping[str, str]) -> tuple[int, str]:
-        """HTTP status and text of a refused request; 0 for any other."""
+        """HTTP status and text of a refused request; 0 for a request that is admitted."""
         host, origin = headers.get("host", ""), headers.get("origin")
         if host not in self._hosts:
             return 421, "The bench is not at this address; use the address that tunnel bench printed."
@@ -164,7 +164,7 @@ async def _answer(send: Send, status: int, *headers: tuple[bytes, bytes], body: 
 
 
 def _report(page: bytes | str) -> HTMLResponse:
-    """A report, which may come from elsewhere with its campaign, and so must not act as a page of the bench."""
+    """A report; it may come from elsewhere with its campaign, so it must not act as a page of the bench."""
     from tunnel_lab.report import security_policy
 
     headers = {"cache-control": "no-store", "content-security-policy": security_policy()}

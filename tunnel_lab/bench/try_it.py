@@ -52,7 +52,8 @@ class TryItPage:
 
     def __init__(self, folder: Path) -> None:
         self._folder, self._trial, self._busy = folder, RigTrial(), False
-        self._kinds = {kind.name: kind for kind in known_effects() if not kind.driven}  # of free decays
+        # duration of free decays
+        self._kinds = {kind.name: kind for kind in known_effects() if not kind.driven}
         words = (
             "The rig by the fast integrator, without noise. Grey: the nominal model; blue: with the effect."
         )
@@ -81,7 +82,7 @@ class TryItPage:
     def _slider(
         self, key: str, name: str, unit: str, limits: Sequence[float], value: float, form: str
     ) -> None:
-        """A slider of a field of the trial, below its name and value; limits: least, greatest and step."""
+        """A slider for a field of the trial, below its name and value; limits: least, greatest and step."""
         mark = beside(unit)
         label = ui.label(f"{name}: {value:{form}}{mark}")
 
@@ -154,10 +155,10 @@ class RigTrial:
         cn_r: Cnr, 1/rad.
         spring_stiffness: Kr, N m/rad.
         wind_speed: V, m/s; 0 is wind-off.
-        release_angle_deg: degrees.
-        duration: s.
-        effect: its name; empty: none.
-        severity: of the effect, in its unit.
+        release_angle_deg: release angle, degrees.
+        duration: duration, s.
+        effect: name of the effect; empty: none.
+        severity: severity of the effect, in its unit.
     """
 
     cn_beta: float = 0.4719
@@ -171,7 +172,7 @@ class RigTrial:
 
 
 def chosen_effect(trial: RigTrial) -> Effect | None:
-    """The effect of a trial with the values of its example, except the severity; None where it has no influence."""
+    """The effect of a trial with the values of its example, except the severity; None if it has no influence."""
     if not trial.effect or trial.severity == 0.0:
         return None
     kind = effect_class(trial.effect)
@@ -203,7 +204,7 @@ def simulate(trial: RigTrial) -> tuple[Array, Array, Array]:
     sensor = SensorModel(RATE, noise_std=0.0, resolution=0.0)
     records = []
     for effects in ((),) if effect is None else ((), (effect,)):
-        rng = np.random.default_rng(1)  # the same random moments at every change
+        rng = np.random.default_rng(1)  # the same random moments after every change
         chain = EffectChain.draw(stated, effects, rng)
         try:
             motion = forward_motion(rig, follow_fastest(rig, chain.physics()), RATE)
@@ -234,7 +235,7 @@ def plan_text(trial: RigTrial, name: str) -> str:
 
 
 def effect_words(trial: RigTrial) -> list[str]:
-    """The effect as an option of ``tunnel simulate``; empty where there is none."""
+    """The effect as an option of ``tunnel simulate``; empty if there is none."""
     effect = chosen_effect(trial)
     if effect is None:
         return []
@@ -246,7 +247,7 @@ def trial_sentence(trial: RigTrial, time: Array, nominal: Array, seen: Array) ->
     """A sentence on the result of the trial.
 
     Args:
-        time: s, shape (n,).
+        time: times, s, shape (n,).
         nominal: reading of the nominal model, rad, shape (n,).
         seen: reading with the effect, rad, shape (n,).
     """

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 NEW = "/upload"
 """Address for the files of a new session."""
-_MOST_FILES = 1000  # of a request
+_MOST_FILES = 1000  # maximum number of files in a request
 _one_at_a_time = Lock()  # two requests must not take the same new name
 
 
@@ -46,7 +46,7 @@ def drop_zone(url: str, kept: Callable[[str], Awaitable[None] | None], fault: Fa
 
     Args:
         url: address for the files.
-        kept: called with the address of their page when all are saved.
+        kept: function called with the address of the files' page when all are saved.
     """
     most = UPLOAD_BYTES - 1_000_000  # less the frame of the request
     label = f"Drop files here, or press + to choose (at most {UPLOAD_BYTES / 1e6:.0f} MB)"
@@ -110,7 +110,7 @@ async def _take(request: Request, session_for: Callable[[Sequence[str]], Session
 
 
 def keep(session: Session, files: Sequence[tuple[str, bytes]]) -> None:
-    """Save files, all or none, under safe names; a file of the same name is replaced.
+    """Save files, all or none, under safe names; a file with the same name is replaced.
 
     Args:
         files: name and content of each.
@@ -133,4 +133,4 @@ def keep(session: Session, files: Sequence[tuple[str, bytes]]) -> None:
         for partial, _ in staged:
             partial.unlink(missing_ok=True)
         with suppress(OSError):
-            session.uploads.rmdir()  # succeeds only where it is empty
+            session.uploads.rmdir()  # this succeeds only for an empty folder

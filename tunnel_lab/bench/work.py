@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 _FIRST = re.compile(r"\$ (?P<command>.*) \(process (?P<process>\d+), started (?P<started>\S+)\)")
 _LAST = re.compile(r"exit status (?P<status>-?\d+)")
 _PAUSED, _GOES_ON = "paused", "goes on"
-_PATIENCE_S = 3.0  # for a command to end by itself
+_PATIENCE_S = 3.0  # s for a command to end by itself
 _started: dict[Path, subprocess.Popen[bytes]] = {}
 Given = ParamSpec("Given")
 ResultT = TypeVar("ResultT")
@@ -45,12 +45,12 @@ class Work:
     """The state of a command, from its log.
 
     Args:
-        command: as typed in a terminal; empty where there is no log.
+        command: the command as typed in a terminal; empty without a log.
         started: date and time, ISO 8601.
-        lines: printed so far.
+        lines: lines printed so far.
         printed: time of the last line, s since the epoch.
         pauses: number of pauses.
-        status: exit status; None while it runs, and where it ended without one.
+        status: exit status; None while the command runs, and if it ended without a status.
     """
 
     command: str = ""
@@ -109,7 +109,7 @@ def work_of(log: Path) -> Work:
 
 
 def seconds_taken(log: Path) -> float | None:
-    """Wall time of a command that has succeeded, s; None where it has not, or was paused."""
+    """Wall time of a command that succeeded, s; None if it did not, or was paused."""
     work = work_of(log)
     if work.status != 0 or work.pauses:
         return None
@@ -153,7 +153,7 @@ def stop(log: Path) -> None:
 
 
 def stop_all() -> None:
-    """End every command that this process has started."""
+    """End every command that this process started."""
     for log in _started:
         stop(log)
 
@@ -165,7 +165,8 @@ def _send(log: Path, name: str, mark: str = "") -> None:
     if mark:
         with log.open("a") as stream:
             stream.write(f"{mark}\n")
-    os.killpg(work.process, getattr(signal, name))  # the lock is held, so the number is still its own
+    # the lock is held, so the number is still that of the command
+    os.killpg(work.process, getattr(signal, name))
 
 
 @dataclass(frozen=True)
@@ -173,9 +174,9 @@ class Runs:
     """The runs to which effects are fitted by hand.
 
     Args:
-        campaign: its folder.
-        state: of the campaign's files; fits of another state are not used.
-        left_out: ids of the runs that are left out.
+        campaign: folder of the campaign.
+        state: state of the campaign's files; fits of another state are not used.
+        left_out: ids of the left-out runs.
     """
 
     campaign: Path
@@ -187,7 +188,7 @@ async def closure(runs: Runs, effects: Sequence[str], *, converged: bool) -> Clo
     """The part of the gap that effects chosen by hand explain.
 
     Args:
-        converged: whether the fit frees their forms and goes on until it has converged.
+        converged: whether to free the forms and continue the fit to convergence.
 
     Raises:
         TunnelError: when the campaign cannot be read, or an effect cannot be fitted to it.

@@ -17,9 +17,9 @@ from tunnel_sim.files.reading import stem_of
 from tunnel_sim.vocabulary.errors import TunnelError, one_line
 
 CAMPAIGN_FILE = "campaign.toml"  # as in campaign_schema, which is slow to load
-_LONGEST = 80  # characters of a file name
-_LEAST_NAME = 3  # characters of a name that files share
-_RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\.|$)", re.IGNORECASE)  # devices of Windows
+_LONGEST = 80  # maximum number of characters of a file name
+_LEAST_NAME = 3  # minimum number of characters of a name that files share
+_RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\.|$)", re.IGNORECASE)  # names of devices in Windows
 ESTIMATOR = "output_error"
 """The estimator whose estimate opens the diagnosis."""
 DIAGNOSIS = "diagnosis"
@@ -89,7 +89,7 @@ class Session:
 
     @property
     def report(self) -> Path:
-        """The report, one HTML page."""
+        """The path of the report, one HTML page."""
         return self._beside("report.html")
 
     def log(self, work: str) -> Path:
@@ -135,7 +135,7 @@ def common_name(file_names: Sequence[str]) -> str:
     stems = [stem_of(Path(safe_name(path[-1]))) for path in paths]
     alike = takewhile(lambda letters: len(set(letters)) == 1, zip(*stems, strict=False))
     shared = "".join(letters[0] for letters in alike)
-    # Part of a number, or a letter before differing numbers, is not a name.
+    # a part of a number, or a letter before differing numbers, is not a name
     whole = re.sub(r"[\W_]*(?:[^\W\d_]?\d*)?$", "", shared) if shared not in stems else shared
     return safe_name(whole) if len(whole) >= _LEAST_NAME else safe_name(stems[0])
 
@@ -216,7 +216,7 @@ STAGES = (
 
 
 def closed(session: Session, key: str) -> str:
-    """The step to do before a stage can be opened, in one line; empty where the stage is open."""
+    """The step to do before a stage can be opened, in one line; empty if the stage is open."""
     place = [stage.key for stage in STAGES].index(key)
     if place > 0 and not session.imported:
         return "Write the campaign on the page Records first."
@@ -255,7 +255,7 @@ def _hashes(session: Session, _: object) -> dict[str, str]:
 
 
 def read_result(path: Path) -> dict[str, Any] | None:
-    """The JSON document that a command has written; None where there is none."""
+    """The JSON document that a command has written; None if there is none."""
     from tunnel_sim.files.reading import read_json
 
     if not path.is_file():
@@ -264,10 +264,10 @@ def read_result(path: Path) -> dict[str, Any] | None:
 
 
 def read_diagnosis(session: Session) -> Diagnosis | None:
-    """The diagnosis as it is shown; None where there is none.
+    """The diagnosis as the page shows it; None if there is none.
 
     Raises:
-        TunnelError: when the file is not one that this version's ``tunnel diagnose --json`` writes.
+        TunnelError: when the file was not written by this version's ``tunnel diagnose --json``.
     """
     from tunnel_lab.report import diagnosis_file
 

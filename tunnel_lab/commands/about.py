@@ -25,7 +25,7 @@ from tunnel_sim.vocabulary.errors import EXTRAS, TunnelError, did_you_mean, inst
 
 PACKAGES = ("mujoco", "numpy", "scipy", "torch", "gymnasium", "polars", "matplotlib")
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-LARGEST_ERROR = 5.0  # largest error of the self-check, standard deviations
+LARGEST_ERROR = 5.0  # largest error in the self-check, standard deviations
 _COMPILER_S = 5.0
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
@@ -126,7 +126,7 @@ def installed() -> Iterator[tuple[str, str]]:
 
 
 def compiler() -> str:
-    """The C compiler that an installation from source would use, and its version."""
+    """The C compiler for an installation from source, and its version."""
     name = os.environ.get("CC") or next(filter(shutil.which, ("cc", "gcc", "clang")), None)
     if name is None:
         return "none; needed only to install from source"

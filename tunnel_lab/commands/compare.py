@@ -54,7 +54,7 @@ def compare(
         path, motions = documents[diagnoses.index(other)], (other.motion, diagnoses[0].motion)
         what = "has motion = '{}', and the first one has '{}'".format(*motions)
         raise TunnelError(what, where=shown(path), remedy="compare diagnoses of one kind of motion")
-    # The campaign's name; the file's where campaigns share a name; if also shared, with a number.
+    # the campaign's name; the file's if campaigns share a name; with a number if files share it too
     names, stems = [d.campaign for d in diagnoses], [one_line(path.stem) for path in documents]
     if len(set(names)) < len(names):
         names = stems
@@ -67,7 +67,7 @@ def compare(
 
 @dataclass(frozen=True)
 class Entry:
-    """A quantity as one diagnosis states it: in words, and as a number where there is one."""
+    """A quantity in one diagnosis: in words, and as a number if there is one."""
 
     text: str = _NONE
     number: Quantity | None = None
@@ -78,8 +78,8 @@ class ComparedRow:
     """A quantity of every diagnosis.
 
     Args:
-        unit: of its numbers; empty where the cells are words.
-        labelled: whether a reader finds the unit beside the first label, and not in the cells.
+        unit: unit of its numbers; empty if the cells are words.
+        labelled: whether a reader finds the unit beside the first label instead of in the cells.
     """
 
     labels: tuple[str, ...]
@@ -93,7 +93,7 @@ class SideBySide:
     """A table of a comparison.
 
     Args:
-        names: of the diagnoses, a column each.
+        names: names of the diagnoses, a column each.
     """
 
     title: str
@@ -102,7 +102,7 @@ class SideBySide:
     rows: Sequence[ComparedRow]
 
     def texts(self) -> TextTable:
-        """The table for a reader: a value and its deviation share a cell."""
+        """The table for a reader: a value and its standard deviation share a cell."""
         rows = []
         for row in self.rows:
             first, *others = row.labels
@@ -111,7 +111,7 @@ class SideBySide:
         return TextTable(self.title, (*self.labels, *self.names), tuple(rows))
 
     def numbers(self) -> TextTable:
-        """The table for a program: each number alone in its cell, which is empty where there is none."""
+        """The table for a program: each number alone in its cell; a missing number leaves the cell empty."""
         given = [cell.number for row in self.rows for cell in row.cells if cell.number is not None]
         ends = ("low", "high") if any(number.interval is not None for number in given) else ()
         heads = [
@@ -141,8 +141,8 @@ def comparisons(names: Sequence[str], answers: Sequence[Diagnosis]) -> list[Side
     """All tables of a comparison: gap and answer, parameters, coefficients, and their differences from the first.
 
     Args:
-        names: of the diagnoses, each different.
-        answers: the reference first.
+        names: names of the diagnoses, all different.
+        answers: the diagnoses, the reference first.
     """
     units = {name: given.unit for answer in answers for name, given in answer.coefficients.after.items()}
     symbols = {name: COEFFICIENTS.get(name, name) for name in units}
@@ -178,7 +178,7 @@ def _gap_and_answer(answers: Sequence[Diagnosis]) -> list[ComparedRow]:
     """Gap and causes of each diagnosis."""
 
     def excess(answer: Diagnosis, value: float) -> Entry:
-        """An excess with its standard deviation by chance, where the diagnosis has the noise of its runs."""
+        """An excess with its standard deviation by chance, if the diagnosis has the noise of its runs."""
         std = None if answer.maps is None else answer.maps.excess_std
         text = f"{value:.4g}" if std is None else with_std(value, std)
         return Entry(text, Quantity(value, std, "1"))

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from tunnel_sim.vocabulary.plan import CampaignPlan
 
 SHOWN = ("output_error", "conventional", "neural_network")
-"""Estimators of the comparison: the default and the two of the paper. `tunnel score` compares them all."""
+"""Estimators of the comparison: the default and the paper's two methods. `tunnel score` compares all of them."""
 CHECKED_ESTIMATOR = "output_error"
 CHECK_STDS = 4.0
 """The check fails beyond this many standard deviations; its false-alarm rate is one in four thousand."""
@@ -88,7 +88,7 @@ def find_faults(plan: CampaignPlan, folder: Path) -> list[str]:
     """Simulate a plan with effects, identify and diagnose the records, write all results and print two screens.
 
     Returns:
-        Clauses on faults that the diagnosis missed; empty where it found all.
+        Clauses on faults that the diagnosis missed; empty if it found all.
     """
     import diagnosis
     from identification import identify
@@ -106,7 +106,7 @@ def find_faults(plan: CampaignPlan, folder: Path) -> list[str]:
         campaign = simulate_campaign(plan, progress=progress)
     write_campaign(campaign, files.campaign, truth=truth_document(plan), overwrite=True)
     write_whole(folder / PLAN, text.encode())
-    # Everything is written before anything is printed: the reader of a pipe may close it early.
+    # everything is written before anything is printed: the reader of a pipe may close it early
     estimate = identify(campaign, CHECKED_ESTIMATOR, throw=False)
     write_json(files.estimate(CHECKED_ESTIMATOR), estimate.to_json_dict())
     with step_display() as show_step:
@@ -177,7 +177,7 @@ def found_table(plan: CampaignPlan, answer: Diagnosis) -> TextTable:
 def planted_and_found(
     plan: CampaignPlan, answer: Diagnosis
 ) -> dict[tuple[str, str], tuple[float, Quantity | None]]:
-    """Injected parameters by effect and name, each with the answer's; None where the answer lacks it."""
+    """Injected parameters by effect and name, each with the answer's value; None if the answer lacks it."""
     first = answer.candidates[0]
     given = {
         tuple(name.split(".")) if "." in name else (first.effect, name): found

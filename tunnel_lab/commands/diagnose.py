@@ -80,7 +80,7 @@ class AnswerFiles:
             find_browser()
 
     def write_pages(self, answer: Diagnosis, patch: Path | None) -> None:
-        """Write the report and its PDF, where they are asked for."""
+        """Write the report and its PDF, if requested."""
         if answer.data is None or not (self.report or self.pdf):
             return
         from tunnel_lab.report import Byline, write_pdf, write_report
@@ -115,7 +115,7 @@ class Considered:
 
 @dataclass(frozen=True)
 class OwnModel:
-    """A model of the user's own as the nominal model, and how its patch is written."""
+    """A user's model as the nominal model, and how its patch is written."""
 
     model: Annotated[
         Path | None,
@@ -164,7 +164,7 @@ class OwnModel:
     ] = False
 
     def refuse_partial(self) -> None:
-        """Refuse options without those that they belong to."""
+        """Refuse options without the options that they need."""
         partly = self.model is None and (self.free or self.patch or self.asset_dir or self.actuator)
         if (self.model is None) != (self.joint is None) or partly:
             what = (
@@ -177,7 +177,7 @@ class OwnModel:
             )
 
     def read(self, data: Campaign) -> JointModel | None:
-        """The model, if there is one; its patch must be possible."""
+        """The model, if there is one; a patch of it must be possible."""
         from diagnosis import read_model
 
         if self.model is None or self.joint is None:
@@ -282,10 +282,10 @@ def diagnose_with_progress(
 
 
 def write_patch(answer: Diagnosis, path: Path, *, native: bool = False) -> None:
-    """Write the patched model of an answer as MJCF; a `TunnelError` with the reason when there is none.
+    """Write the patched model of an answer as MJCF; a `TunnelError` with the reason if there is none.
 
     Args:
-        native: whether in MuJoCo's own elements alone.
+        native: whether to use MuJoCo's own elements alone.
     """
     from diagnosis.findings.cautions import UNPATCHED
 
@@ -294,7 +294,8 @@ def write_patch(answer: Diagnosis, path: Path, *, native: bool = False) -> None:
         reason = next((caution.rstrip(".") for caution, fact in said if fact.kind == "unpatched"), UNPATCHED)
         raise TunnelError(reason, where="--patch", remedy="leave out --patch for the answer alone")
     nearest = answer.model.native
-    if nearest is not None and not native:  # before it is written: plain MuJoCo refuses the file
+    # printed before it is written, because plain MuJoCo refuses the file
+    if nearest is not None and not native:
         notes = zip(answer.model.notes, answer.model.differences, strict=True)
         say(next(f"Note: {note}" for note, fact in notes if fact.kind == "by plugin"), stderr=True)
     (answer.model if nearest is None or not native else nearest).write(path)

@@ -29,7 +29,7 @@ StatedT = TypeVar("StatedT")
 
 
 def _number(option: str) -> Callable[[str], float]:
-    """A parser of an option's number, which may have a decimal comma."""
+    """A parser for a number in an option, which may have a decimal comma."""
 
     def parsed(text: str) -> float:
         from tunnel_sim.files.importing.choices import option_number
@@ -43,7 +43,7 @@ def _number(option: str) -> Callable[[str], float]:
 
 
 def _with_choices(own: type[StatedT]) -> type[StatedT]:
-    """A dataclass of options with an option for each of `CHOICES` before its own."""
+    """A dataclass of options with an option for each entry of `CHOICES` before its own."""
     options: list[tuple[str, Any, Any]] = []
     for key, words in CHOICES.items():
         flag, kind = f"--{key.replace('_', '-')}", words.kind
@@ -115,7 +115,7 @@ class StatedChoices:
     ] = None
 
     def choices(self) -> ImportChoices:
-        """The choices of the recipe, replaced where an option states another."""
+        """The choices of the recipe, replaced if an option states another."""
         from tunnel_sim.files.importing.choices import (
             ImportChoices,
             parse_setting,

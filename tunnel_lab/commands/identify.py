@@ -42,11 +42,11 @@ if TYPE_CHECKING:
     from tunnel_sim.vocabulary.turning_points import TurningPoints
 
 DIAGNOSE = "run the diagnosis"
-"""The ending of notes whose remedy is a diagnosis."""
+"""The ending of notes with a diagnosis as their remedy."""
 FEW_RUNS = 3
-"""For up to this many runs the windows are shown by default."""
+"""Maximum number of runs for showing the windows by default."""
 ESTIMATORS = "  {estimators}"
-"""Placeholder of their list in the help."""
+"""Placeholder in the help for the list of estimators."""
 _HELP_WIDTH = 78
 WITH_WEIGHTS = ("neural_network", "neural_posterior")
 
@@ -83,7 +83,7 @@ class BudgetOptions:
     def make(
         self, data: Campaign, estimate: Estimate, chosen: str | Estimator, others: Iterable[str]
     ) -> Budget:
-        """The budget of an estimate, from the estimator that made it and from others."""
+        """The budget of an estimate, from the estimator that made it and from other estimators."""
         from identification import identify
         from identification.uncertainty import budget as budgets
 
@@ -220,7 +220,7 @@ def estimate_shown(
 
 
 def _show_turning_points(points: TurningPoints, json: Path | None) -> None:
-    """Identify turning points by their own likelihood: ωn and ζ, with the JSON of a run."""
+    """Identify turning points by the likelihood of their times and angles: ωn and ζ, with the JSON of a run."""
     from identification.estimate import Estimate, RunEstimate
     from identification.show.numbers import with_std
     from identification.show.quantity import Quantity

@@ -53,7 +53,7 @@ class ScoredRecords:
     ] = None
 
     def of(self, usual: Grid) -> Grid:
-        """The grid, or the usual one, with these trials and this seed."""
+        """The given or the usual grid, with these trials and this seed."""
         from tunnel_lab.experiments.score_grid import load_grid
 
         wanted = usual if self.grid is None else load_grid(self.grid)
@@ -63,7 +63,7 @@ class ScoredRecords:
 
 @dataclass(frozen=True)
 class ScoreView:
-    """The shown part of the score, and its baselines."""
+    """The part of the score to show, and its baselines."""
 
     cells: Annotated[bool, Option("--cells", help="Also show every cell.")] = False
     check: Annotated[
@@ -182,7 +182,7 @@ def score(
 
 
 def _present(view: ExperimentView, out: Path | None, failed: Iterable[Failed]) -> None:
-    """Write and print what was found."""
+    """Write and print the results."""
     written = "" if out is None else view.write(out)
     if out is not None:
         shutil.rmtree(out / PARTS)
@@ -206,7 +206,7 @@ def _baseline(text: str, names: tuple[str, ...], *, everything: bool) -> Results
 
 
 def _parts(out: Path | None, overwrite: bool) -> Path | None:
-    """The folder of unfinished work in ``--out``, which has no other content than that of an interrupted score."""
+    """The folder of unfinished work in ``--out``, which may contain only the files of an interrupted score."""
     from tunnel_sim.files.writing import clear_leftovers
 
     if out is None:
@@ -216,7 +216,7 @@ def _parts(out: Path | None, overwrite: bool) -> Path | None:
         if not out.is_dir():
             raise TunnelError("is a file, not a folder", where=str(out), remedy="name another --out")
         names = {path.name for path in out.iterdir()}
-        # The parts are removed after all results are written: a full disk may have interrupted the writing.
+        # the parts are removed after all results are written, because a full disk may interrupt the writing
         interrupted = PARTS in names and all(name.startswith(_RESULTS) for name in names - {PARTS})
         if overwrite:
             shutil.rmtree(out / PARTS, ignore_errors=True)

@@ -127,10 +127,10 @@ def spread(campaign: Campaign, count: int = 4) -> tuple[Run, ...]:
     """A few runs that differ in spring and wind, to keep a plot readable.
 
     Args:
-        count: at most this many runs (a count).
+        count: maximum number of runs.
 
     Returns:
-        The first runs of distinct spring and wind speed; the first runs where conditions are not stated.
+        The first runs of distinct spring and wind speed; the first runs if conditions are not stated.
     """
     chosen: dict[object, Run] = {}
     for run in campaign.runs:

@@ -36,10 +36,10 @@ class PaperTraining:
     starts: Annotated[int, Option("--starts", min=1, help="Number of training runs of each network.")] = 3
 
     def spec(self, seed: int, steps: int | None) -> TrainingSpec:
-        """The specification; refuses what is not a range.
+        """The specification; values that are not a range are refused.
 
         Args:
-            steps: largest number for each network; None: the usual ones.
+            steps: maximum number for each network; None: the usual numbers.
         """
         from identification.neural.networks import DataSpec
         from identification.neural.train import TrainingSpec

@@ -62,14 +62,14 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         preset: ``identification`` or ``diagnosis``.
         simulation: ``linear``: runs by the closed form of the linear model, their estimate to first order in the
             noise; ``full``: runs in MuJoCo, estimated by a fit. None: ``full`` for a diagnosis, else ``linear``.
-        noise_std: of the sensor, rad.
-        sample_rate: of the sensor, Hz.
-        severities: the effects that the diagnosis considers, each with the range of its severity in its unit; the
-            diagnosis preset only.
+        noise_std: noise of the sensor, rad.
+        sample_rate: sample rate of the sensor, Hz.
+        severities: the effects that the diagnosis considers, each with the range of its severity in its unit;
+            only for the diagnosis preset.
         targets: relative standard deviations (fractions) of Cnβ and Cnr at which an identification ends.
-        probability: of one effect (a probability) at which a diagnosis ends.
+        probability: probability of one effect at which a diagnosis ends.
         costs: rig time of a run, `Costs` or some of its times by name, s; None: the defaults of `Costs`.
-        seconds_per_nat: rig time that a nat is worth, s.
+        seconds_per_nat: rig time that is worth a nat, s.
         rig: path of a rig description; None takes the packaged rig.
         scatter: differences between the runs, a `Scatter` or some of its numbers by name; None: no differences.
         **unknown: other names, which are refused.
@@ -175,7 +175,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         """Begin a campaign on a rig of unknown truth.
 
         Args:
-            seed: of the truth and all noise; None continues with the present generator.
+            seed: seed of the truth and all noise; None continues with the present generator.
             options: ``truth`` (coefficients by name, SI) and ``effects`` (parameters by effect) instead of drawn
                 values.
 
@@ -289,7 +289,7 @@ def reached(known: Knowledge, targets: tuple[float, float], probability: float) 
 
     Args:
         targets: relative standard deviations of Cnβ and Cnr (fractions), used without a vocabulary.
-        probability: of one effect alone (a probability), used with a vocabulary.
+        probability: probability of one effect alone, used with a vocabulary.
     """
     if not known.choices:
         return False
@@ -321,7 +321,7 @@ def picture(known: Knowledge, targets: tuple[float, float], probability: float) 
 
     Args:
         targets: relative standard deviations of Cnβ and Cnr, fractions.
-        probability: threshold that ends a diagnosis (a probability).
+        probability: probability at which a diagnosis ends.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

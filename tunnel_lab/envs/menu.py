@@ -30,10 +30,10 @@ class RunChoice:
 
     Args:
         spring: number of the spring in the rig's table.
-        spring_stiffness: its Kr, N m/rad.
+        spring_stiffness: stiffness Kr of the spring, N m/rad.
         wind_speed: V, m/s; 0 is wind-off.
-        release_angle: rad.
-        duration: of the record, s.
+        release_angle: release angle, rad.
+        duration: duration of the record, s.
     """
 
     spring: int
@@ -49,7 +49,7 @@ class RunChoice:
         return f"spring {self.spring}, {wind}, {degrees(self.release_angle):.3g}°, {self.duration:g} s"
 
     def condition(self, name: str, air_density: float) -> Condition:
-        """The run as a plan describes it.
+        """The run in the form of a plan.
 
         Args:
             air_density: ρ, kg/m³.
@@ -65,9 +65,9 @@ class Menu:
 
     Args:
         springs: (number, Kr in N m/rad) of the available springs.
-        wind_speeds: m/s.
-        release_angles: rad.
-        durations: s.
+        wind_speeds: wind speeds, m/s.
+        release_angles: release angles, rad.
+        durations: durations, s.
     """
 
     springs: tuple[tuple[int, float], ...]
@@ -163,10 +163,10 @@ class Preset:
     """Default values of the arguments of `CampaignEnv`.
 
     Args:
-        wind_speeds: m/s.
-        durations: s.
-        noise_std: rad.
-        sample_rate: Hz.
+        wind_speeds: wind speeds, m/s.
+        durations: durations, s.
+        noise_std: noise of the sensor, rad.
+        sample_rate: sample rate, Hz.
     """
 
     springs: Sequence[int]
@@ -187,8 +187,8 @@ def preset_sensor(preset: Preset, noise_std: float | None, sample_rate: float | 
     """The preset's sensor with the given values, without quantisation; None takes the preset's value.
 
     Args:
-        noise_std: rad.
-        sample_rate: Hz.
+        noise_std: noise of the sensor, rad.
+        sample_rate: sample rate, Hz.
 
     Raises:
         TunnelError: when a number is not positive, or the rate does not divide the rig's 1000 steps per second.

@@ -47,9 +47,9 @@ LARGE = 1e4
 """Bound of estimates and covariances in the observation, in their units."""
 _EMPTY = Record(np.arange(2.0), np.zeros(2))  # for a planned run
 MEAN = {"cn_beta": 0.45, "cn_r": -0.12, "yaw_inertia": 0.1014, "mechanical_damping": 0.016}
-"""Means of the coefficients an episode draws, in their units."""
+"""Means of the coefficients that an episode draws, in their units."""
 STD = {"cn_beta": 0.08, "cn_r": 0.03, "yaw_inertia": 0.004, "mechanical_damping": 0.004}
-"""Their standard deviations: normal, independent, cut at `CUT` of them. Also the estimate's prior."""
+"""Their standard deviations: normal, independent, cut at `CUT` standard deviations. Also the estimate's prior."""
 CUT = 2.5
 OPTIONS = ("truth", "effects")
 
@@ -59,8 +59,8 @@ class EpisodeConditions:
     """The fixed conditions of all episodes of an environment.
 
     Args:
-        sensor: its zero is not used, because each episode has its own.
-        effects: the vocabulary of the diagnosis; empty where the campaign only identifies.
+        sensor: sensor; its zero is not used, because each episode draws a zero.
+        effects: the vocabulary of the diagnosis; empty if the campaign only identifies.
         linear: whether runs come from linear theory instead of MuJoCo and a fit; only without effects.
         scatter: differences between the runs, unknown to the operator.
         max_runs: number of the run at which the drift of the runs is complete.
@@ -108,13 +108,13 @@ class Knowledge:
     """The knowledge at a point of an episode, without the truth.
 
     Args:
-        beliefs: before the first run and after each informative one.
+        beliefs: belief before the first run and after each informative run.
         choices: the runs requested so far, including lost ones.
-        costs: rig time of each, s.
-        fits: reading and fit of the runs that the belief uses, with their links; empty where ``linear``.
-        learnt: results of these runs where ``linear``.
+        costs: rig time of each run, s.
+        fits: reading and fit of the runs in the belief, with their links; empty if ``linear``.
+        learnt: results of these runs if ``linear``.
         study: the last diagnosis; None before the first, or without a vocabulary.
-        status: of the last run, ``ok`` or the fault.
+        status: status of the last run, ``ok`` or the fault.
     """
 
     conditions: EpisodeConditions
@@ -195,7 +195,7 @@ class CampaignSession:
     def perform(self, known: Knowledge, choice: RunChoice) -> Knowledge:
         """Make a run and update the knowledge.
 
-        A run whose motion grows without bound is lost: it takes time and gives no result.
+        A run that diverges is lost: it takes time and gives no result.
         """
         conditions, truth = self._conditions, self.truth
         costs = (*known.costs, known.cost(choice))
@@ -249,7 +249,7 @@ class CampaignSession:
             return replace(known, status=f"not diagnosed: {error.what}")
 
     def _deviations(self, number: int) -> dict[str, float]:
-        """Draw the deviations of the next run, whose number counts from 0: relative, and rad of ``zero``."""
+        """Draw the deviations of the next run, numbered from 0: relative, and rad for ``zero``."""
         share = np.array([number / max(1, self._conditions.max_runs - 1)])
         (own,) = self._conditions.scatter.deviations(self._between, share)
         if own:
@@ -260,7 +260,7 @@ class CampaignSession:
 def _deviating(
     choice: RunChoice, values: Mapping[str, float], own: Mapping[str, float]
 ) -> tuple[RunChoice, dict[str, float]]:
-    """The conditions and coefficients of a run that deviates from the choice."""
+    """The conditions and coefficients of a run that deviates from the chosen run."""
 
     def true(name: str, stated: float) -> float:
         return stated * max(0.0, 1.0 + own.get(name, 0.0))
@@ -278,7 +278,8 @@ def answers(effects: Sequence[str]) -> tuple[str, ...]:
 def probabilities(known: Knowledge) -> Array:
     """The diagnosis' probabilities of `answers`, shape (effects + 3,).
 
-    They are equal before the first diagnosis; while no gap is detected, ``none`` has all but the false-alarm rate.
+    They are equal before the first diagnosis. While no gap is detected, ``none`` has the probability 1 minus
+    the false-alarm rate.
     """
     names = answers(known.conditions.effects)
     shares = np.zeros(len(names))
@@ -311,8 +312,8 @@ class RigTruth:
     """The truth of an episode, which no observation contains.
 
     Args:
-        sensor_zero: rad.
-        runs: deviations of the runs so far, relative, and rad of their zeros; empty where the runs repeat.
+        sensor_zero: zero of the sensor, rad.
+        runs: deviations of the runs so far, relative, and rad for their zeros; empty if the runs repeat.
     """
 
     coefficients: Truth
@@ -342,11 +343,11 @@ def draw_truth(
 ) -> RigTruth:
     """Draw an episode's truth; values from the options of a reset replace the drawn ones.
 
-    Every number is always drawn; an option therefore does not change the other numbers.
+    Every number is always drawn, so that an option does not change the other numbers.
 
     Args:
-        severities: the effects; one of them acts, all equally probable, with severities log-uniform in their
-            ranges (SI units); empty: no effect acts.
+        severities: the effects with the ranges of their severities (SI units). One effect acts, all being
+            equally probable, with a severity that is log-uniform in its range; empty: no effect acts.
 
     Raises:
         TunnelError: for an unknown option, coefficient or effect, or a number that is out of range.

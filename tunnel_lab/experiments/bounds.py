@@ -34,13 +34,13 @@ def decay_bound(time: Array, release: float, omega_n: float, zeta: float, noise:
 
     Args:
         time: sample times from the release, shape (n,), s.
-        release: angle, rad.
+        release: release angle, rad.
         omega_n: true natural frequency, rad/s.
         zeta: true damping ratio.
         noise: standard deviation of a reading, rad.
 
     Returns:
-        By quantity; empty without an oscillation, or without noise, where the bound is zero.
+        By quantity; empty without an oscillation, or without noise, for which the bound is zero.
     """
     from identification.uncertainty.cramer_rao import damped_sinusoid_bound
 
@@ -72,10 +72,10 @@ def coefficients_bound(
     Args:
         releases: release angle of each run, at rest, rad.
         noise: standard deviation of a reading, rad.
-        scatter: of the runs; None: they repeat exactly.
+        scatter: scatter of the runs; None: they repeat exactly.
 
     Returns:
-        By quantity; empty without noise, where the bound is zero.
+        By quantity; empty without noise, for which the bound is zero.
     """
     from identification.uncertainty.cramer_rao import campaign_bound
 
@@ -116,7 +116,7 @@ def in_phase(
     """The truth that an estimator should recover: Cnβ and Cnr in phase with angle and rate (decision 0004).
 
     Args:
-        effects: all that act, with or without a lag of the air.
+        effects: all acting effects, with or without a lag of the air.
         conditions: spring stiffness (N m/rad), wind speed (m/s) and air density (kg/m³) of every run.
     """
     runs = []
@@ -146,7 +146,7 @@ def plan_bounds(plan: CampaignPlan, rig: Rig, widths: Mapping[str, float]) -> Pl
     Args:
         widths: relative standard deviations between runs by name, as in `Repeatability`; zero: none.
     """
-    from tunnel_sim.engine.virtual_campaign import stated_run  # only here: loads MuJoCo
+    from tunnel_sim.engine.virtual_campaign import stated_run  # imported here because it loads MuJoCo
 
     noise, rate = reading_deviation(plan.sensor), plan.sensor.sample_rate
     truth = recovered(plan, rig)

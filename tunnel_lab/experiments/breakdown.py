@@ -80,7 +80,7 @@ ABOUT = (
 )
 _SIDE_BY_SIDE = 3  # estimators in a table for 80 columns
 _DECADES = 2.0  # decades of standard deviations above one, at the ends of the colours
-_DARK = 1.2  # decades above which white text is legible
+_DARK = 1.2  # number of decades above which white text is legible
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +88,7 @@ class BiasCase:
     """A campaign under one effect, or none.
 
     Args:
-        effect: its name, or ``no effect``.
+        effect: name of the effect, or ``no effect``.
         severity: target excess, in noise variances (a ratio); 0 for no effect.
         reached: excess after the reference simulator's nominal refit, in noise variances (a ratio).
         realisation: number of the realisation, from 0.
@@ -109,8 +109,8 @@ def conditions_of(seed: int, *, duration: float = 10.0) -> TrueConditions:
     """The campaign to which the effects are added.
 
     Args:
-        seed: of the actual release angles.
-        duration: of every run, s.
+        seed: seed of the actual release angles.
+        duration: duration of every run, s.
     """
     springs, speeds, degrees = (np.array(column) for column in zip(*_RUNS, strict=True))
     release = np.round(np.radians(degrees), 4)
@@ -138,8 +138,8 @@ def make_cases(
 
     Args:
         severities: target excesses after the nominal refit, in noise variances (ratios).
-        duration: of every run, s.
-        show_steps: show the progress of sizing on standard error.
+        duration: duration of every run, s.
+        show_steps: whether to show the progress of sizing on standard error.
     """
     from identification.uncertainty.cramer_rao import campaign_bound
 
@@ -150,7 +150,7 @@ def make_cases(
         progress=show_steps,
     )
     several = [realised(draw, i, seed) for draw in (nothing, *sized) for i in range(realisations)]
-    # A motion without random forcing is integrated once.
+    # a motion without random forcing is integrated once
     moving = [draw for i, draw in enumerate(several) if i % realisations == 0 or _random(draw)]
     motions = iter(simulate_motions(moving))
     cases = []
@@ -211,7 +211,7 @@ def breakdown_of(cases: Sequence[BiasCase], estimators: tuple[str, ...], seed: i
     """Run estimators on every case; the results have a row of `ANSWER_COLUMNS` for each quantity.
 
     Args:
-        seed: of the cases.
+        seed: seed of the cases.
     """
     return Experiment(
         "breakdown",
@@ -275,7 +275,7 @@ def breakdown_view(results: pl.DataFrame) -> ExperimentView:
     """The view of a breakdown.
 
     Args:
-        results: of `breakdown_of`.
+        results: results of `breakdown_of`.
     """
     frame = breakdown_frame(results)
     if frame.is_empty():

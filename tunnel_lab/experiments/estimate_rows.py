@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from tunnel_sim.vocabulary.campaign import Campaign
 
 REFUSED, RAISED, WRONG = "refused", "raised", "wrong_return"
-"""The campaign was refused, the estimator raised an exception, or it returned something else than an estimate."""
+"""The campaign was refused, the estimator raised an exception, or it did not return an estimate."""
 VERBS = {REFUSED: "refused", RAISED: "raised an exception", WRONG: "returned no valid estimate"}
 """Statuses of failures in words."""
 
@@ -34,7 +34,7 @@ NOT_ASKED = (
     "no_reference_size",
     "coefficients_withheld",
 )
-"""Statuses beside which a value is absent because the runs cannot give it, or the estimator does not.
+"""Statuses with which a value is missing because the runs cannot give it, or the estimator does not.
 
 These are not failures of the estimator.
 """
@@ -47,7 +47,7 @@ class Failure:
     Args:
         status: one of `VERBS`, or another reason stated by the caller.
         message: one line.
-        shown: the details for a user to find the cause: a traceback, or the line.
+        shown: the details from which a user can find the cause: a traceback, or the line.
         error: name of the exception's type; empty without an exception.
     """
 
@@ -62,7 +62,7 @@ class Failure:
 
 
 def asked(campaign: Campaign, estimator: str | Estimator) -> Estimate | Failure:
-    """The estimate of a campaign, or the reason for its absence."""
+    """The estimate of a campaign, or the reason why it is missing."""
     try:
         return identify(campaign, estimator, throw=False)
     except WrongReturn as error:
@@ -84,7 +84,7 @@ class Failed:
 
     @property
     def of_the_estimator(self) -> bool:
-        """Whether the code of the estimator is at fault, and not the campaign."""
+        """Whether the fault is in the code of the estimator, not in the campaign."""
         return self.status in (RAISED, WRONG)
 
     @property
@@ -108,9 +108,9 @@ def failures_in(table: pl.DataFrame, by: Sequence[str], seen: Iterable[Failed]) 
     """The failures in a table of results, also from an earlier command.
 
     Args:
-        table: with ``estimator``, ``status`` and ``message``.
+        table: table with ``estimator``, ``status`` and ``message``.
         by: the columns that name a campaign.
-        seen: failures of this command, whose details are known.
+        seen: failures of this command, with known details.
     """
     first = {(one.estimator, one.status): one.first for one in seen}
     kind = pl.col("status").str.split(" ").list.first()
@@ -142,9 +142,9 @@ def quantity_rows(
     """A row of `QUANTITY_COLUMNS` for each quantity.
 
     Args:
-        found: None where there is no estimate.
-        units: of the quantities, by name.
-        truth: by quantity, in its unit; quantities without one may be left out.
+        found: the estimate; None if there is none.
+        units: units of the quantities, by name.
+        truth: true values by quantity, in its unit; quantities without one may be left out.
         bound: Cramér–Rao bound, by quantity, in its unit.
     """
     for name, unit in units.items():
@@ -156,10 +156,10 @@ def quantity_rows(
 def not_given(table: pl.DataFrame | pl.LazyFrame) -> dict[str, tuple[str, ...]]:
     """Quantities by estimator that it gives in no row, unless its status is a failure in all of them.
 
-    Failures are exceptions, and campaigns none of whose runs could be identified.
+    Failures are exceptions, and campaigns in which no run could be identified.
 
     Args:
-        table: with the columns ``estimator``, ``quantity``, ``value`` and ``status``.
+        table: table with the columns ``estimator``, ``quantity``, ``value`` and ``status``.
     """
     absent = (
         table.lazy()

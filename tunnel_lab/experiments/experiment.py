@@ -5,8 +5,8 @@ resumption, workers and progress are the same for all kinds, and are here and in
 
 A folder has a manifest, such as ``sweep.json``, with the description of the experiment and the versions of the
 code. Every finished task has a Parquet file in each dataset, named for the task. Files are written under a
-temporary name and renamed. ``checksums`` has a file for each task in the format of ``sha256sum --check``; a task
-whose files do not match it is repeated.
+temporary name and renamed. ``checksums`` has a file for each task in the format of ``sha256sum --check``; a
+task is repeated if its files do not match it.
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ RESULTS, CHECKSUMS = "results", "checksums"
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """The last bit of sums in a linear algebra library depends on its number of threads; a task uses one."""
 _PACKAGES = ("virtual-wind-tunnel", "mujoco", "numpy", "scipy", "polars")
-_OWN = "estimator "  # before the name of a user's estimator, in the versions
+_OWN = "estimator "  # prefix of the name of a user's estimator, in the versions
 
 
 @dataclass(frozen=True)
 class Done:
-    """A finished task: files that depend on nothing but the task, and the estimates that failed.
+    """A finished task: files that depend only on the task, and the failed estimates.
 
     Args:
         files: bytes by dataset.
@@ -70,18 +70,20 @@ class Experiment(Generic[TaskT]):
     """One experiment of any kind.
 
     Args:
-        kind: its name, also the manifest's.
-        tasks: in the order of the results.
-        work: on a task: a pure function of a module with its data, sent to the workers with every task.
-        name: of a task's files, without suffix.
-        description: all that determines the results, but for the code, in JSON's types.
-        estimators: names of the ones that the work uses.
-        datasets: names of its tables; the results come first.
-        weight: of a task in the progress.
+        kind: name of the kind, also the manifest's.
+        tasks: tasks in the order of the results.
+        work: function of a task: a pure function of a module with its data, sent to the workers with every
+            task.
+        name: function from a task to the name of its files, without suffix.
+        description: everything that determines the results, apart from the code, in JSON's types.
+        estimators: names of the estimators that the work uses.
+        datasets: names of the tables; the results come first.
+        weight: weight of a task in the progress.
         about: further entries of the manifest, for people.
-        elsewhere: the remedy where a folder holds something else.
-        code_matters: whether results of changed code are refused, as where the code is what is examined.
-        described: convert a manifest's description to this version; raises for anything else.
+        elsewhere: the remedy if a folder holds something else.
+        code_matters: whether results of changed code are refused, because the code itself is examined.
+        described: function that converts a manifest's description to this version; raises for any other
+            content.
     """
 
     kind: str
@@ -121,7 +123,7 @@ def _code() -> str:
 
 
 def made_with(estimators: Sequence[str], code_matters: bool) -> dict[str, str]:
-    """Versions and processor, with the code of the user's estimators, and of this project where it matters."""
+    """Versions and processor, with the code of the user's estimators, and of this project if it matters."""
     own = {f"{_OWN}{one.name}": one.code for one in own_estimators(estimators)}
     return {**versions(), **own, **({"code": _code()} if code_matters else {})}
 
@@ -141,10 +143,10 @@ def parquet(
 
 
 class Store(Protocol):
-    """Where results are kept: `Parts`, or the sealed answers of a blind set."""
+    """A store of results: `Parts`, or the sealed answers of a blind set."""
 
     def finished(self) -> set[str]:
-        """Names of the tasks whose results are complete."""
+        """Names of the tasks with complete results."""
 
     def keep(self, name: str, done: Done) -> None:
         """Store the results of a task."""
@@ -158,7 +160,7 @@ class Parts(Generic[TaskT]):
     experiment: Experiment[TaskT]
 
     def finished(self) -> set[str]:
-        """Tasks whose files exist and match their checksums."""
+        """Names of the tasks whose files exist and match their checksums."""
         return {name for name in map(self.experiment.name, self.experiment.tasks) if self._whole(name)}
 
     def _whole(self, name: str) -> bool:
@@ -206,10 +208,10 @@ class Parts(Generic[TaskT]):
 
 
 def begin(experiment: Experiment[TaskT], folder: Path) -> Parts[TaskT]:
-    """The folder of an experiment, created where missing.
+    """The folder of an experiment, created if missing.
 
     Raises:
-        TunnelError: when the folder holds another experiment or something else, or cannot be written.
+        TunnelError: when the folder holds another experiment or other content, or cannot be written.
     """
     kind, where, elsewhere = experiment.kind, shown(folder), experiment.elsewhere
     manifest, description = folder / f"{kind}.json", experiment.description
@@ -243,7 +245,7 @@ def begin(experiment: Experiment[TaskT], folder: Path) -> Parts[TaskT]:
 def refuse_other_content(experiment: Experiment[Any], folder: Path) -> None:
     """Refuse a folder without a manifest that is not empty."""
     clear_leftovers(folder)
-    # A command stopped before it wrote the manifest may have left empty folders.
+    # a command stopped before it wrote the manifest may have left empty folders
     for path in folder.iterdir() if folder.is_dir() else ():
         dataset = path.name in (*experiment.datasets, CHECKSUMS) and path.is_dir()
         if not (dataset and not any(path.iterdir())) and not path.name.startswith(
@@ -257,7 +259,7 @@ def refuse_other_content(experiment: Experiment[Any], folder: Path) -> None:
 def read_manifest(
     kind: str, folder: Path, elsewhere: str = ELSEWHERE, described: Callable[[Any], Mapping[str, Any]] = dict
 ) -> dict[str, Any]:
-    """The manifest in the folder of a kind of experiment; a `TunnelError` if it is none of this version."""
+    """The manifest in the folder of a kind of experiment; a `TunnelError` if it is not of this version."""
     path = folder / f"{kind}.json"
     document = read_json(path, remedy=f"name the folder of a {kind}")
     if document.get("schema_version") != SCHEMA_VERSION:
@@ -269,7 +271,7 @@ def read_manifest(
 
 
 def _first_difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
-    """The first key whose values differ, by its own name where tables contain tables; empty where none does."""
+    """The first key with different values, by its own name if tables contain tables; empty if there is none."""
     for key in {**old, **new}:
         one, other = old.get(key), new.get(key)
         if one != other:
@@ -281,7 +283,7 @@ def _first_difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
 
 @dataclass(frozen=True)
 class CommandOutcome:
-    """The outcome of a command: the number of tasks finished before it, and the estimates that failed in it."""
+    """The outcome of a command: the number of tasks finished before it, and the estimates that failed during it."""
 
     found: int
     failed: tuple[Failed, ...] = ()
@@ -303,7 +305,7 @@ def run(
     """Do the unfinished tasks of an experiment. Only this process stores results: a repeated task is stored once.
 
     Args:
-        progress: called with the finished and the whole weight, at the start and after each task.
+        progress: function called with the finished and the total weight, at the start and after each task.
 
     Raises:
         TunnelError: when a worker has other versions, or a result cannot be stored.
@@ -334,7 +336,7 @@ def run(
 def run_in(
     experiment: Experiment[TaskT], folder: Path, workers: Workers, progress: Progress | None = None
 ) -> tuple[Parts[TaskT], CommandOutcome]:
-    """Begin or continue an experiment in a folder, after which its results are complete; errors as in `begin`."""
+    """Begin or continue an experiment in a folder until its results are complete; errors as in `begin`."""
     store = begin(experiment, folder)
     outcome = run(experiment, store, workers, progress)
     for dataset in (*experiment.datasets, CHECKSUMS):  # partial files of a killed command
@@ -348,7 +350,7 @@ def results_of(
     """The complete results of an experiment of some minutes.
 
     Args:
-        folder: where unfinished work is kept; None: nowhere.
+        folder: folder for unfinished work; None: it is not kept.
     """
     with nullcontext(folder) if folder else TemporaryDirectory() as name:
         store, outcome = run_in(experiment, Path(name), workers, progress)

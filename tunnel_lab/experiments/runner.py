@@ -26,19 +26,19 @@ Progress = Callable[[int, int], None]
 Say = Callable[[str], None]
 """A function to call with each line for the user."""
 PATIENCE = 3
-"""How often processes may die in succession without finishing a task."""
+"""Maximum number of processes that may die in succession without finishing a task."""
 LOCAL = "local"
 ATTEMPTS = 3
-"""How often a task is submitted again after Dask has given it up."""
+"""Number of times a task is submitted again after Dask has given it up."""
 POLL_S = 5.0
-"""How long to wait for a task before the workers are counted, s."""
+"""Time to wait for a task before the workers are counted, s."""
 CONNECT_S = 10.0
-"""How long a scheduler may take to answer, s."""
+"""Time limit for a scheduler to answer, s."""
 _FEWEST_IN_FLIGHT = 8
 
 
 class Workers(Protocol):
-    """The executors of the work: `processes` or a cluster."""
+    """Function that does the work: `processes` or a cluster."""
 
     def __call__(
         self, work: Callable[[TaskT], ResultT], tasks: Sequence[TaskT], /
@@ -48,7 +48,8 @@ class Workers(Protocol):
 
 def say_on_stderr(line: str) -> None:
     """Print a line about the workers on standard error."""
-    from tunnel_lab.terminal.outputs import say  # only here: worker processes start with this module
+    # imported here because worker processes start with this module
+    from tunnel_lab.terminal.outputs import say
 
     say(f"tunnel: {line}", stderr=True)
 
@@ -89,13 +90,13 @@ def available_processors() -> int:
 def crew(
     jobs: int | None, scheduler: str | None, tasks: int | None = None, *, usual: int | None = None
 ) -> Workers:
-    """The workers that the options of a command ask for.
+    """The workers requested by the options of a command.
 
     Args:
-        jobs: value of ``--jobs``; None: ``usual``.
+        jobs: value of ``--jobs``; None: the value of ``usual``.
         scheduler: value of ``--scheduler``; None: processes of this machine.
-        tasks: number of tasks, which limits the number of workers; None: it is not known yet.
-        usual: None: a worker for each processor.
+        tasks: number of tasks, which limits the number of workers; None: not known yet.
+        usual: usual number of workers; None: one for each processor.
     """
     if jobs is not None and scheduler not in (None, LOCAL):
         what = "its workers are started on their own machines"
@@ -110,7 +111,7 @@ def on_cluster(address: str, workers: int, say: Say, *, poll_s: float = POLL_S) 
     """Workers of a Dask cluster.
 
     Args:
-        address: of a scheduler, such as ``tcp://host:8786``, or ``local`` to start a cluster here.
+        address: address of a scheduler, such as ``tcp://host:8786``, or ``local`` to start a cluster here.
         workers: number of workers of a local cluster.
         poll_s: time to wait for a task before counting the workers, s.
     """
@@ -207,7 +208,7 @@ def _work_of(
 
 
 def _tell_of_workers(client: Any, alone: bool, say: Say) -> bool:
-    """Whether no worker is connected; this is reported once each time."""
+    """Whether no worker is connected; each such interruption is reported once."""
     if client.status != "running":
         raise _gone()
     address = client.scheduler.address if client.scheduler else ""

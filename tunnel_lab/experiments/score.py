@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 
 
 UNIT_TRIALS = 5
-"""Trials done together; an interruption loses at most these in each process."""
+"""Number of trials done together; an interruption loses at most these in each process."""
 _UNITS = {**UNITS, "zeta": "1", "omega_n": "rad/s"}
 ANSWER_COLUMNS: Mapping[str, Any] = {"estimator": pl.String, **QUANTITY_COLUMNS, "milliseconds": pl.Float64}
 TRIAL_COLUMNS: Mapping[str, Any] = {**dict.fromkeys(("cell", "trial"), pl.Int64), **ANSWER_COLUMNS}
@@ -112,12 +112,12 @@ def answer_rows(
     """One estimator on one campaign of known truth.
 
     Args:
-        truth: by quantity, SI; ζ and ωn for the first run.
+        truth: true values by quantity, SI; ζ and ωn for the first run.
         bound: the Cramér–Rao bound by quantity, SI; quantities without one are left out.
 
     Returns:
-        A row of `ANSWER_COLUMNS` and a message for each quantity of the truth, and the failure, if any: where the
-        estimator raises an exception or returns an invalid result, value and std are None.
+        A row of `ANSWER_COLUMNS` and a message for each quantity of the truth, and the failure, if any: if the
+            estimator raises an exception or returns an invalid result, value and std are None.
     """
     begun = time.perf_counter()
     answer = asked(campaign, estimator)
@@ -144,7 +144,7 @@ def score_grid(
     """Every estimator on every trial of a grid, in the order of cells, trials and estimators, and the failures.
 
     Args:
-        workers: except for the times, the table does not depend on them.
+        workers: workers; except for the times, the table does not depend on them.
         parts: folder of unfinished work; None: it is not kept.
 
     Raises:
@@ -180,7 +180,7 @@ class Results:
 
     @cached_property
     def not_given(self) -> dict[str, tuple[str, ...]]:
-        """Quantities of the grid by estimator; see `not_given`."""
+        """Quantities of the grid that each estimator does not give; see `not_given`."""
         return not_given(self.table)
 
     def gives(self, estimator: str, quantity: str) -> bool:

@@ -37,8 +37,8 @@ def trials_of(rows: pl.DataFrame, *, percent: bool = False) -> Trials:
     """The trials of one estimator and one quantity.
 
     Args:
-        rows: with ``truth``, ``value``, ``std``, ``bound`` and ``unit``.
-        percent: whether in % of the truths, which are then not zero.
+        rows: rows with ``truth``, ``value``, ``std``, ``bound`` and ``unit``.
+        percent: whether values are in % of the truths, which must then not be zero.
     """
     given = rows.filter(pl.col("value").is_not_null())
     truth, value, std = (given[name].to_numpy() for name in ("truth", "value", "std"))
@@ -56,7 +56,7 @@ def trials_of(rows: pl.DataFrame, *, percent: bool = False) -> Trials:
 
 @dataclass(frozen=True, eq=False)
 class ScoredRow:
-    """The trials of one estimator and one quantity, of one cell or of several that are pooled.
+    """The trials of one estimator and one quantity, of one cell or of several pooled cells.
 
     Args:
         cells: the trials of each cell, at least one.
@@ -107,7 +107,7 @@ class ScoredRow:
 
     @property
     def coverage(self) -> Proportion | None:
-        """Coverage of the 95 % intervals among the trials with an estimate; None where there is none."""
+        """Coverage of the 95 % intervals among the trials with an estimate; None without any."""
         identified = sum(trials.error.size for trials in self.cells)
         return Proportion(sum(trials.covered for trials in self.cells), identified) if identified else None
 
@@ -123,10 +123,10 @@ class ScoreColumn:
 
     Args:
         head: heading, with the unit.
-        texts: the cells, of the figures of all rows of a table.
-        find: the figure of a row.
-        what: its meaning in a sentence below the tables; empty: the heading says it.
-        detail: whether only a page has room for it.
+        texts: function that gives the cells from the figures of all rows of a table.
+        find: function that gives the figure of a row.
+        what: its meaning in a sentence below the tables; empty: the heading suffices.
+        detail: whether the column is shown only on a page.
     """
 
     head: str
@@ -150,7 +150,7 @@ def _plain(found: Sequence[float | None]) -> list[str]:
 
 
 def _coverages(found: Sequence[Proportion | None]) -> list[str]:
-    """Shares with their intervals; ``low`` or ``high`` where one differs from 95 %, by Holm's test of all rows."""
+    """Shares with their intervals; ``low`` or ``high`` if one differs from 95 %, by Holm's test of all rows."""
     from scipy.stats import binomtest
 
     tests = [binomtest(one.count, one.total, NOMINAL_COVERAGE).pvalue if one else 1.0 for one in found]
@@ -197,20 +197,20 @@ COVERAGE = ScoreColumn(
 FAILED = ScoreColumn("failed", _counts, lambda row: row.failures)
 
 POOLED = (RMSE_PERCENT, RMSE_OVER_BOUND, WORST, BIAS_OVER_BOUND, COVERAGE, FAILED)
-"""The columns of a score's cells together."""
+"""The columns for a score's cells together."""
 CELL = (RMSE_PERCENT, RMSE_OVER_BOUND, BIAS_PERCENT, BIAS_IN_STDS, COVERAGE, FAILED)
-"""The columns of one cell of a score."""
+"""The columns for one cell of a score."""
 LINE = (RMSE, RMSE_OVER_BOUND, BIAS, COVERAGE, FAILED)
-"""The columns of a sweep."""
+"""The columns for a sweep."""
 
 
 def score_table(
     title: str, columns: Sequence[ScoreColumn], rows: Iterable[tuple[Mapping[str, str], ScoredRow]]
 ) -> TextTable:
-    """A table of scored trials, in sections of their places.
+    """A table of scored trials, in sections by place.
 
     Args:
-        rows: each with the place where it was scored, by heading: the same headings in all rows.
+        rows: rows, each with the place of the score, by heading: the same headings in all rows.
     """
     every = list(rows)
     places = tuple(every[0][0]) if every else ()
@@ -240,9 +240,9 @@ def file_columns(row: ScoredRow, columns: Mapping[str, ScoreColumn], error: str)
     """Figures of a row as columns of a file.
 
     Args:
-        columns: by their names in the file. The ends of the 95 % interval stand beside a share, the standard error
-            beside another figure.
-        error: ending of the names of standard errors.
+        columns: columns by their names in the file. The ends of the 95 % interval stand beside a share, the
+            standard error beside any other figure.
+        error: suffix of the names of standard errors.
     """
     found: dict[str, float | None] = {}
     for name, column in columns.items():

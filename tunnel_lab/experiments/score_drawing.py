@@ -26,7 +26,7 @@ _KINDS = {"decay": "Single decays", "campaign": "Campaigns"}
 _PANEL, _BESIDE, _ROW, _HEAD = 0.95, 0.2, 0.2, 0.95  # inches
 _LEGEND = 1.8  # inches, with the gap before it
 _TITLE = 9  # points
-_LONGEST = 36  # characters in a line of a label
+_LONGEST = 36  # maximum number of characters in a line of a label
 
 
 @dataclass(frozen=True)
@@ -34,8 +34,8 @@ class _Rows:
     """The cells of one kind, as the rows of its panels.
 
     Args:
-        cells: their indices in the grid.
-        labels: of the rows, some in several lines.
+        cells: indices of the cells in the grid.
+        labels: labels of the rows, some in several lines.
         title: the conditions common to the rows.
         quantities: drawn quantities, given by at least one of the estimators.
         lines: number of lines of the longest label.

@@ -1,8 +1,8 @@
 """The grid of conditions for scoring estimators, a TOML file; its cells, and their simulated records.
 
-The motion comes from the compiled forward integrator, the reading from the virtual potentiometer. A trial depends
-only on the seed, its cell and its number. Therefore every estimator gets the same records, and a cell has the same
-records in any grid.
+The motion comes from the compiled forward integrator, the reading from the virtual potentiometer. A trial
+depends only on the seed, its cell and its number. Therefore every estimator gets the same records, and a cell
+has the same records in any grid.
 """
 
 from __future__ import annotations
@@ -102,17 +102,18 @@ class Cell:
     """One point of the grid.
 
     Args:
-        kind: ``decay`` (one wind-off run of stated ζ and frequency) or ``campaign``.
+        kind: ``decay`` (one wind-off run with given ζ and frequency) or ``campaign``.
         noise: standard deviation of the sensor's noise over the amplitude, a ratio.
-        duration: of every record, s.
-        amplitude: of the release, rad.
-        sample_rate: Hz.
-        resolution: of the sensor, rad; 0 for none.
+        duration: duration of every record, s.
+        amplitude: amplitude of the release, rad.
+        sample_rate: sample rate, Hz.
+        resolution: resolution of the sensor, rad; 0 for none.
         zeta: damping ratio of a decay; 0 in a campaign.
         frequency: natural frequency of a decay, Hz; 0 in a campaign.
-        wind_speed: of a campaign's wind-on runs, m/s; 0 in a decay.
-        springs: of a campaign, N m/rad; none in a decay.
-        effect: in the format of ``tunnel simulate --effect``, several joined by `` + ``; ``none``: nominal model.
+        wind_speed: wind speed of a campaign's wind-on runs, m/s; 0 in a decay.
+        springs: springs of a campaign, N m/rad; none in a decay.
+        effect: effect in the format of ``tunnel simulate --effect``, several joined by `` + ``; ``none``:
+            nominal model.
     """
 
     kind: Literal["decay", "campaign"]
@@ -162,7 +163,7 @@ class Grid:
     cells: tuple[Cell, ...]
 
     def trials_for(self, estimator: str) -> int:
-        """Number of trials for an estimator in each cell, always the first ones."""
+        """Number of trials for an estimator in each cell, always the first trials."""
         return min(self.trials, dict(self.trials_of).get(estimator, self.trials))
 
     def to_json_dict(self) -> dict[str, Any]:
@@ -318,7 +319,7 @@ def effects_of(text: str) -> tuple[Effect, ...]:
     """The effects of a cell, in the order of the vocabulary; none for ``none``.
 
     Args:
-        text: in the format of `Cell`.
+        text: text in the format of `Cell`.
 
     Raises:
         TunnelError: when a name is unknown or a value out of range.

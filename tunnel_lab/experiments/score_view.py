@@ -128,7 +128,7 @@ def check(baseline: Results, now: Results, *, rate: float = DIFFERENCE_RATE) -> 
 
 
 def _estimates(results: Results, estimators: Sequence[str]) -> pl.DataFrame:
-    """The estimates of some estimators, in an order of their own."""
+    """The estimates of some estimators, in the order given."""
     keys = ["estimator", "cell", "quantity", "trial"]
     mine = results.table.filter(pl.col("estimator").is_in(list(estimators)))
     return mine.select(*keys, "value", "std").sort(keys)
@@ -206,7 +206,7 @@ def score_view(results: Results, *, cells: bool = False) -> ExperimentView:
     """The view of a score.
 
     Args:
-        cells: whether it has a table for each cell.
+        cells: whether the view has a table for each cell.
     """
     from tunnel_lab.experiments.score_drawing import score_figure
 
@@ -225,7 +225,7 @@ def notes_below(results: Results) -> list[Paragraph]:
 
 
 def _few_trials(results: Results) -> list[Paragraph]:
-    """Uncertainty of the RMSE from the smallest number of trials."""
+    """Uncertainty of the RMSE with the smallest number of trials."""
     fewest = min(results.grid.trials_for(name) for name in results.estimators)
     if fewest >= _FEW:
         return []

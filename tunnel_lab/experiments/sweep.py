@@ -1,4 +1,4 @@
-"""A sweep: its file, checked before anything is simulated, and the experiment that it is."""
+"""A sweep: its file, checked before any simulation, and its experiment."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Sweep(SweepCases):
 
     @property
     def experiment(self) -> Experiment[int]:
-        """The sweep as an experiment: a task is a shard, some cases in sequence that are simulated together."""
+        """The sweep as an experiment: a task is a shard, some consecutive cases that are simulated together."""
         last, numbers = (
             len(str(self.shards - 1)),
             {"cases": self.size, "runs": self.runs, "shards": self.shards},
@@ -56,7 +56,7 @@ class Sweep(SweepCases):
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A worker process makes it once from its text, and its axes once."""
+        """A worker process rebuilds the sweep once from its text, and its axes once."""
         return _received, (self.to_json(),)
 
     def to_json(self) -> str:
@@ -118,7 +118,7 @@ def read_sweep(path: Path, estimators: Sequence[str] = ()) -> Sweep:
             sections[name] = {**old, **changes} if isinstance(old, dict) else old
         parse_rig(sections, f"{where}, rig '{rig.name}'")
         rigs.append(sections)
-    # Files and changes of the rigs are left out: the resulting descriptions are stored.
+    # files and changes of the rigs are left out, because the resulting descriptions are stored
     names = [table.model_copy(update={"file": None, "changes": {}}) for table in document.rig]
     sweep = Sweep(document.model_copy(update={"rig": names}), tuple(rigs))
     _check_cases(sweep, where)

@@ -29,9 +29,9 @@ class SweepCase:
     """One campaign of a sweep.
 
     Args:
-        index: in the order of the product, from 0.
+        index: index in the order of the product, from 0.
         replicate: number of the repetition with other noise, from 0.
-        duration: of every run, s.
+        duration: duration of every run, s.
         plan: the campaign with its seed.
         document: the case as a campaign description, ready to be written as TOML.
     """

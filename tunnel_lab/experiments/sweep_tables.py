@@ -27,7 +27,8 @@ from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.plan import DEFAULT_SAMPLE_RATE
 
 STEPS_PER_SHARD = 500_000
-"""Integration steps of one shard: about two seconds on one core, the most that a killed sweep loses per worker."""
+"""Integration steps of one shard: about two seconds on one core, the greatest loss per worker of a killed
+sweep."""
 
 
 def _listed(value: object) -> object:
@@ -40,7 +41,7 @@ Many = Annotated[list[T], BeforeValidator(_listed), Field(min_length=1)]
 
 
 class SweepRigTable(StrictModel):
-    """``[[rig]]``: a rig description with changes; the packaged description where no file is named."""
+    """``[[rig]]``: a rig description with changes; the packaged description if no file is named."""
 
     name: OneLine = Field(default="packaged", description="a short name in quotes")
     file: OneLine | None = Field(default=None, description="the path of a rig description in quotes")

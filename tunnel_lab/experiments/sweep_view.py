@@ -1,8 +1,8 @@
 """Summary of a sweep: error against noise, speed, spring and severity, by estimator, with intervals.
 
-Errors are in % of the truth, or in the quantity's unit where a truth is zero. The values of the other axes are
-pooled. Lines along noise, speed and spring use the cases without effects and without scatter, if the sweep has any.
-Cases of severity 0 count as cases without effects.
+Errors are in % of the truth, or in the quantity's unit if a truth is zero. The values of the other axes are
+pooled. Lines along noise, speed and spring use the cases without effects and without scatter, if the sweep has
+any. Cases of severity 0 count as cases without effects.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ AXES = {
 DRAWN: Mapping[str, str] = {"omega_n": "ωn", "zeta": "ζ", "cn_beta": "Cnβ", "cn_r": "Cnr"}
 """Quantities that have a panel; Izz, Cr and the sensor's zero are in the first table and the CSV."""
 _TICKS = 5  # intervals between labels of six digits, such as 0.00075, that do not touch
-_ASIDE = 0.012  # of the axis, between two estimators
+_ASIDE = 0.012  # share of the axis, between two estimators
 _LOGARITHMIC = ("noise_std", "spring_stiffness")
 _WIDE = 10.0  # ratio of the largest to the least value above which an axis is logarithmic
 
@@ -123,7 +123,7 @@ def sweep_view(results: pl.LazyFrame, name: str) -> ExperimentView:
     """The view of the finished part of a sweep.
 
     Args:
-        name: of the sweep.
+        name: name of the sweep.
     """
     lines = summarise(results)
     along = groups(lines)
@@ -164,7 +164,7 @@ def lines_of(data: pl.DataFrame, estimator: str, quantity: str) -> Iterator[Scor
 
 
 def _repeating(data: pl.DataFrame, but: str = "") -> pl.DataFrame:
-    """The cases whose runs repeat exactly, except for the scatter ``but``; all cases where there are none."""
+    """The cases with runs that repeat exactly, except for the scatter ``but``; all cases if there are none."""
     found = data
     for column in SCATTER_COLUMNS:
         found = found if column == but else found.filter(found[column] == 0.0)
@@ -194,7 +194,7 @@ def error_figure(lines: Sequence[ScoreLine]) -> Figure | None:
     """RMSE and bias along one axis, a row of panels for each quantity, a colour for each estimator.
 
     Returns:
-        The figure, with 95 % intervals from the number of trials; None where no quantity has a panel.
+        The figure, with 95 % intervals from the number of trials; None if no quantity has a panel.
     """
     quantities = [name for name in DRAWN if any(line.quantity == name and line.score.rmse for line in lines)]
     if not quantities:

@@ -39,7 +39,7 @@ NOT_SIMULATED, SIMULATED = "not_simulated", "simulated"
 RUN_QUANTITIES: Mapping[str, str] = {"omega_n": "rad/s", "zeta": "1"}
 CAMPAIGN_QUANTITIES: Mapping[str, str] = {**{name: UNITS[name] for name in PARAMETERS}, "sensor_zero": "rad"}
 SCATTER_COLUMNS: Mapping[str, str] = {f"scatter_{one.name}": one.name for one in fields(Scatter)}
-"""The column of each number of a scatter."""
+"""The column for each number of a scatter."""
 CASE_COLUMNS: Mapping[str, Any] = {
     **dict.fromkeys(("case", "replicate"), pl.UInt32),
     "seed": pl.Int64,
@@ -124,7 +124,7 @@ def bounds_of(cases: Sequence[SweepCase]) -> dict[int, PlanBounds]:
 
 
 def _widths(plan: CampaignPlan) -> dict[str, float]:
-    """Relative standard deviations between the runs of a case, of its scatter and of its effects, by name."""
+    """Relative standard deviations between the runs of a case, from its scatter and its effects, by name."""
     widths = {name: getattr(plan.scatter, name) for name in SCATTERED}
     for setting in plan.effects:
         effect = effect_from(setting.name, setting.parameters)
@@ -152,9 +152,9 @@ def case_rows(
     """The rows of one estimator's answer to one case.
 
     Args:
-        bounds: of the case, see `bounds_of`.
-        estimator: its name; None where the case was only simulated.
-        outcome: its estimate, or the failure; None where the case was only simulated.
+        bounds: bounds of the case, see `bounds_of`.
+        estimator: name of the estimator; None if the case was only simulated.
+        outcome: estimate, or the failure; None if the case was only simulated.
 
     Yields:
         Values of `RESULT_COLUMNS`, in their order: of the runs, then of the campaign.
@@ -183,7 +183,7 @@ def case_rows(
         found = run.status.name.lower() if run else status
         for row in quantity_rows(run, RUN_QUANTITIES, nominal, bounds.runs[place], found):
             yield (*head, *given, *row, message)
-    # Spring, wind-on speed and release angle of the campaign, each only if unique.
+    # spring, wind-on speed and release angle of the campaign, each only if unique
     kinds = (
         {condition.spring_stiffness for condition in conditions},
         {condition.wind_speed for condition in conditions if condition.wind_speed > 0.0} or {0.0},

@@ -41,16 +41,16 @@ from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.record import Array
 
 FALSE_ALARMS = 0.01
-"""Share of calibration samples that are called unlike the training, although they are like it."""
-_KEPT_EVERY = 250  # steps between checkpoints
+"""Share of calibration samples that are called unlike the training although they are like it."""
+_KEPT_EVERY = 250  # number of steps between checkpoints
 _SHRINK = 0.05  # shrinkage of the context's covariance towards its mean variance
 Progress = Callable[[str, int, int], None]
 INPUTS = ("rivals", "runs", "valid", "shifts")
 """The network's arguments, by their names among the samples."""
 FAR = 3e4
-"""Standard deviations beyond which a sample is left out: the nominal fit is of another oscillation."""
-_EFFECTS_WEIGHT = 0.1  # weight of the effects' cross entropy against the posterior's
-_LEAST_STD = 0.05  # least standard deviation of an input over the training set
+"""Standard deviations beyond which a sample is left out: the nominal fit found another oscillation."""
+_EFFECTS_WEIGHT = 0.1  # weight of the effects' cross entropy, relative to the posterior's
+_LEAST_STD = 0.05  # minimum standard deviation of an input over the training set
 _GREATEST_GRADIENT = 5.0
 
 
@@ -76,8 +76,8 @@ def train(
     """Simulate the missing shards, and fit both networks; finished work in the folder is kept and used.
 
     Args:
-        workers: of the simulations; the result does not depend on them.
-        progress: called with the name of the step, the amount finished, and the total.
+        workers: workers for the simulations; the result does not depend on them.
+        progress: function called with the name of the step, the amount finished, and the total.
 
     Returns:
         The safetensors file, and the record of the training as JSON.

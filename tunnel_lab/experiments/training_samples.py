@@ -32,14 +32,14 @@ PARTS = (TRAINING, "tuning", "calibration")
 LETTERS = {"records": "r", "campaigns": "c"}
 """Kinds of samples by the name of their table."""
 CAMPAIGNS = 200
-"""Campaigns of a shard that are integrated together."""
+"""Number of campaigns of a shard that are integrated together."""
 VARIANTS = 3
-"""Readings of each campaign: of other noise levels, lengths and numbers of runs."""
+"""Number of readings of each campaign, with other noise levels, lengths and numbers of runs."""
 MOST_RUNS = 16
 _SUBSTEPS = 2
 _NOISE = (0.3, 8.0)  # factor on the drawn noise, in the variants after the first
 SAMPLE_RATE = 250.0
-"""Hz; the noise is reduced in proportion to the root of the rate, so that as much is known as at 1000 Hz."""
+"""Hz; the noise is reduced in proportion to the root of the rate, which preserves the information at 1000 Hz."""
 DURATION = 10.0
 KINDS: Mapping[str, float] = {"none": 0.25, "single": 0.4, "pair": 0.15, "three": 0.12, "four": 0.08}
 _MIXTURE = Mixture(textbook=0.4, rare=0.0)
@@ -61,8 +61,8 @@ def samples_of(seed: int, shards: Mapping[str, int], sizes: Mapping[str, float])
     """The samples of some shards of each part, a table for each network; shards may be added later.
 
     Args:
-        shards: number of each part's.
-        sizes: from `sizes_at_unit_excess`.
+        shards: number of shards of each part.
+        sizes: sizes from `sizes_at_unit_excess`.
     """
     known = tuple(sorted(sizes.items()))
     return Experiment(
@@ -97,7 +97,7 @@ def read_samples(folder: Path, dataset: str, part: str, count: int | None = None
 
     Args:
         dataset: ``records`` or ``campaigns``.
-        count: None: all shards.
+        count: number of shards; None: all.
     """
     paths = sorted((folder / dataset).glob(f"{part}-*.parquet"))[:count]
     frames = [frame for frame in map(pl.read_parquet, paths) if frame.width]
@@ -155,10 +155,10 @@ def truth_of(c: TrueConditions) -> dict[str, float]:
 def reduced(
     campaign: Campaign, truth: Mapping[str, float], families: list[str], *, first_run: int
 ) -> Iterator[tuple[str, dict[str, Array]]]:
-    """The samples of one campaign: itself, and one of its records.
+    """The samples of one campaign: the campaign itself, and one of its records.
 
     Args:
-        truth: coefficients by name, SI.
+        truth: true coefficients by name, SI.
         families: families of the acting effects.
         first_run: number of the record's run, modulo the number of runs.
     """
@@ -308,10 +308,10 @@ def sizes_at_unit_excess(seed: int) -> dict[str, float]:
 
 
 def nearer(draw: CampaignDraw, excess: float) -> CampaignDraw:
-    """A draw with its one effect nearer to the unit excess.
+    """A draw with one effect, scaled nearer to the unit excess.
 
     Args:
-        excess: of the draw, in noise variances (a ratio); infinite where the motion grows without bound.
+        excess: excess of the draw, in noise variances (a ratio); infinite where the motion grows without bound.
     """
     effect = draw.effects[0]
     if np.isfinite(excess):

@@ -24,7 +24,7 @@ class ExperimentView:
     """The results of an experiment.
 
     Args:
-        figures: by name of their files, without suffix; drawn when they are written.
+        figures: figures by the names of their files, without suffix; drawn when they are written.
         data: contents of further files, by name.
     """
 

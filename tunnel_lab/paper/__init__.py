@@ -1,1 +1,1 @@
-"""The paper's tables and figures, ours beside theirs."""
+"""The paper's tables and figures beside this project's results."""

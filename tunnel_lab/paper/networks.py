@@ -1,4 +1,4 @@
-"""Fig. 3, Table III, Table IV and Figs 4 to 6: the networks against runs whose truth is known."""
+"""Fig. 3, Table III, Table IV and Figs 4 to 6: the networks on runs of known truth."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ _SPEED = 10.0  # m/s, assumed
 _MAGNIFIED = (12.0, 15.0)  # s
 NETWORK, CONVENTIONAL, BEST = "neural_network", "conventional", "output_error"
 METHODS = (NETWORK, CONVENTIONAL, BEST)
-# One of the explanations of Table III that the tutorial on the paper's own gap cannot distinguish.
+# one of the explanations of Table III that the tutorial on the paper's own gap cannot distinguish
 SOFTENING = (
     parse_effect("cubic_stiffness:coefficient=-0.39"),
     parse_effect("quadratic_damping:coefficient=0.0038"),
@@ -346,11 +346,11 @@ class SpringInference:
     """The implications of one spring of Table II for the run behind Table III.
 
     Args:
-        spring: number.
+        spring: number of the spring.
         wind_speed: V at which the printed Cnβ reduces the spring's wind-off frequency to the table's
             mean, m/s.
-        mechanical_damping: Cr, the table's mean damping minus the part of the printed Cnr, N m s/rad;
-            negative is impossible.
+        mechanical_damping: Cr, the table's mean damping minus the contribution of the printed Cnr, N m s/rad; a
+            negative value is impossible.
     """
 
     spring: int
@@ -365,7 +365,7 @@ def infer_springs() -> tuple[SpringInference, ...]:
     Table IV, which the paper took from the means of Table III.
 
     Returns:
-        One row per spring whose wind-off frequency is above the table's mean, as a positive Cnβ requires.
+        One row for each spring with a wind-off frequency above the table's mean, as a positive Cnβ requires.
     """
     rows = paper_windows()
     omega = float(np.mean([row.omega_n_rad_per_s for row in rows]))

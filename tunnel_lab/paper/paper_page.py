@@ -37,7 +37,7 @@ class PaperPicture:
 
 @dataclass(frozen=True)
 class PaperSection:
-    """A table or figure of the paper and our result: theirs and ours in a line each."""
+    """A table or figure of the paper and this project's result: each in one line."""
 
     __pydantic_config__ = _STRICT
 
@@ -56,8 +56,8 @@ def signed(value: float, digits: int) -> str:
     """A number with its sign, except zero.
 
     Args:
-        value: in any unit.
-        digits: after the point.
+        value: value in any unit.
+        digits: number of digits after the point.
     """
     rounded = round(value, digits)
     return f"{rounded:+.{digits}f}".replace("-", "−") if rounded else f"{0.0:.{digits}f}"
@@ -86,10 +86,10 @@ def write_paper(
     """Compute the missing parts, and write the page.
 
     Args:
-        folder: of the page, its pictures and finished parts; made where it does not exist.
+        folder: folder of the page, its pictures and finished parts; made if it does not exist.
         parts: all parts by name, in the order of the page.
         names: parts to compute unless finished; finished parts remain in the page.
-        progress: called with the number finished, the total, and the next part's name.
+        progress: function called with the number finished, the total, and the next part's name.
 
     Raises:
         TunnelError: when the folder cannot be written to, or a finished part is damaged.

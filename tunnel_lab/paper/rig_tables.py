@@ -64,7 +64,7 @@ def table_1(_: Path) -> PaperSection:
 
 
 def table_2(folder: Path) -> PaperSection:
-    """Springs, frequencies and the inertia; ours from wind-off runs of the virtual rig."""
+    """Springs, frequencies and the inertia; this project's values are from wind-off runs of the virtual rig."""
     from tunnel_sim import simulate_campaign
 
     springs = paper_springs()
@@ -130,7 +130,7 @@ def table_2(folder: Path) -> PaperSection:
 
 
 def equations(_: Path) -> PaperSection:
-    """The slips of the printed equations, and their results where the truth is known."""
+    """The slips in the printed equations, and their results for a known truth."""
     known = known_run()
     beta = known.cn_beta_of(eq7(known.on, known.off))
     right, wrong = (known.cn_r_of(eq8(known.on, known.off, printed=printed)) for printed in (False, True))
@@ -219,9 +219,9 @@ def springs_figure(springs: Sequence[SpringRow], fit: SpringFit, stated: float) 
     """The springs with the fitted line, and the deviation of each.
 
     Args:
-        springs: of Table II.
-        fit: of the same springs.
-        stated: inertia of Table I, kg m².
+        springs: springs of Table II.
+        fit: line through the same springs.
+        stated: inertia in Table I, kg m².
     """
     fig = figure(WIDTH, 2.9)
     left, right = fig.subplots(1, 2)
@@ -286,7 +286,7 @@ class Oscillation:
 
     @property
     def frequency(self) -> float:
-        """Damped, Hz."""
+        """Damped frequency, Hz."""
         return sqrt(self.omega_n**2 - self.rate**2) / (2.0 * pi)
 
     @property
@@ -297,7 +297,7 @@ class Oscillation:
 
 @dataclass(frozen=True)
 class KnownRun:
-    """A run whose truth is known, with the wind off and on.
+    """A run of known truth, with the wind off and on.
 
     Args:
         inertia: Izz, kg m².
@@ -359,7 +359,7 @@ def printed_transfer_function(zeta: float, omega_n: float) -> Oscillation:
         omega_n: natural frequency, rad/s.
 
     Returns:
-        An oscillation without damping, because the denominator has no term in s. Its ωn² (1/s²) and 2ζωn (1/s) are
-        added as numbers in SI.
+        An oscillation without damping, because the denominator has no term in s. Its ωn² (1/s²) and 2ζωn (1/s)
+        are added as numbers in SI.
     """
     return Oscillation(sqrt(omega_n**2 + 2.0 * zeta * omega_n), 0.0)

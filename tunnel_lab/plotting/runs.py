@@ -47,14 +47,14 @@ WIND_OFF, WIND_ON = BLUE, VERMILION
 PANELS_PER_PAGE = 12
 BINS_PER_DECADE = 60
 LEAKING = 2
-"""Cycles in a record below which a Hann window leaks the mean."""
+"""Number of cycles in a record below which a Hann window leaks the mean."""
 RUNS_PER_PLOT = 6
-"""More lines than colours cannot be distinguished in one plot."""
+"""Maximum number of lines in one plot: more lines than colours cannot be distinguished."""
 ONE_RIG = 1.5
-"""Frequencies within this factor share one plot in absolute units."""
+"""Ratio of frequencies up to which they share one plot in absolute units."""
 MOST_PANELS = 24
 _COLUMNS = 3
-_POINTS = 2000  # number of intervals whose least and greatest readings are drawn
+_POINTS = 2000  # number of intervals, each drawn by its least and greatest reading
 _GREY = "0.6"
 
 
@@ -102,7 +102,7 @@ def trace_pages(campaign: Campaign) -> tuple[Figure, ...]:
 
 @styled
 def wind_off_on_figure(off: Run, on: Run) -> Figure:
-    """A run with the wind off above one with the wind on, preferably of the same spring, on the same axes."""
+    """A run with the wind off above a run with the wind on, preferably of the same spring, on the same axes."""
     fig = figure(WIDTH, 4.2)
     first: Axes | None = None
     for place, (run, colour) in enumerate(((off, WIND_OFF), (on, WIND_ON)), 1):
@@ -202,9 +202,9 @@ def truth_figure(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> F
 def windows_figure(estimate: Estimate) -> Figure:
     """ζ and ωn of the windows of each run against the amplitude, with 95 % intervals.
 
-    A linear rig gives horizontal lines; a slope shows an effect that the linear model lacks. Runs after the sixth
-    and runs with fewer than two windows are left out. Where the runs differ in frequency, each quantity is shown as
-    its deviation from the weighted mean of its run, to show only the change with the amplitude.
+    A linear rig gives horizontal lines; a slope shows an effect that the linear model lacks. Runs after the
+    sixth and runs with fewer than two windows are left out. If the runs differ in frequency, each quantity is
+    shown as its deviation from the weighted mean of its run, to show only the change with the amplitude.
     """
     runs = [run for run in estimate.runs if len(run.windows) > 1][:RUNS_PER_PLOT]
     centres = [window.omega_n.value for run in runs for window in run.windows]
@@ -267,7 +267,7 @@ def deviations(quantities: Sequence[Quantity]) -> list[Quantity]:
 def import_picture(imported: Imported) -> bytes:
     """Draw imported records as PNG: left-out samples are grey, vertical lines mark the beginning and end of runs.
 
-    Samples that are not part of a free decay, although they might be taken for one, are shaded.
+    Samples that are not part of a free decay, but might be mistaken for one, are shaded.
     """
     raws = {id(part.raw): part.raw for part in imported.parts}
     shown = list(raws)[:MOST_PANELS]
@@ -325,8 +325,8 @@ def thinned(time: Array, reading: Array) -> tuple[Array, Array]:
     """A curve with few points that looks the same, broken where samples are missing.
 
     Args:
-        time: shape (n,), s.
-        reading: shape (n,).
+        time: times, shape (n,), s.
+        reading: readings, shape (n,).
 
     Returns:
         Times and readings, shape (m,): the least and the greatest reading of each interval; NaN within a gap.

@@ -93,7 +93,7 @@ def charts(maps: Maps | None) -> dict[str, list[Chart]]:
 
 
 def _filled(label: str, centre: Array, *excesses: Array, run: str = "") -> Chart:
-    """A view of the bins with a value; the others are left out, because a null would break the curves."""
+    """A view of the bins with a value; empty bins are left out, because a null would break the curves."""
     filled = np.any(np.isfinite(excesses), axis=0)
     power = (_rounded(np.maximum(1.0 + excess[filled], LEAST_POWER)) for excess in excesses)
     return {"label": label, "run": run, "data": [_rounded(centre[filled]), *power]}
@@ -107,7 +107,7 @@ def _rounded(values: Array, digits: int = 4) -> list[float | None]:
 def fit_charts(maps: Maps | None) -> dict[str, list[Chart]]:
     """The readings of every run and, below them on the same axis, the residuals, under the name ``fit``.
 
-    They first show the cycles in which the models differ most; there are none without ``maps``.
+    They first show the cycles in which the models differ most. Without ``maps`` there are no charts.
     """
     runs = fitted_runs(maps)
     if not runs:

@@ -29,11 +29,11 @@ def read_diagnosis(path: Path) -> Diagnosis:
 
 
 def diagnosis_of(document: Mapping[str, Any], where: str, remedy: str) -> Diagnosis:
-    """The diagnosis of a document, as `Diagnosis.from_json_dict`, whose values can be shown.
+    """The diagnosis in a document, as from `Diagnosis.from_json_dict`, with a check that its values can be shown.
 
     Args:
-        where: the document is from, in an error.
-        remedy: in an error.
+        where: source of the document, for an error.
+        remedy: remedy, for an error.
 
     Raises:
         TunnelError: when it is not the document of a diagnosis.
@@ -44,29 +44,32 @@ def diagnosis_of(document: Mapping[str, Any], where: str, remedy: str) -> Diagno
     return found
 
 
-def _check(found: Diagnosis) -> None:
+def _check(diagnosis: Diagnosis) -> None:
     """Refuse values of the right type that cannot be shown."""
-    if not found.candidates:
+    if not diagnosis.candidates:
         raise ValueError("'candidates' is empty")
-    stated = (found.coefficients.before, found.coefficients.after, found.coefficients.in_phase)
-    named = [*stated, *(candidate.parameters for candidate in found.candidates)]
-    texts = [found.campaign, *found.causes, *found.ambiguous_with]
-    texts += [candidate.effect for candidate in found.candidates] + [
+    stated = (diagnosis.coefficients.before, diagnosis.coefficients.after, diagnosis.coefficients.in_phase)
+    named = [*stated, *(candidate.parameters for candidate in diagnosis.candidates)]
+    texts = [diagnosis.campaign, *diagnosis.causes, *diagnosis.ambiguous_with]
+    texts += [candidate.effect for candidate in diagnosis.candidates] + [
         name for group in named for name in group
     ]
     if not all(text.isprintable() for text in texts):
         raise ValueError("a name has line breaks or control characters")
-    probabilities = [*found.inclusion.values(), *(candidate.probability for candidate in found.candidates)]
-    for share in (found.gap.closed, *probabilities):
+    probabilities = [
+        *diagnosis.inclusion.values(),
+        *(candidate.probability for candidate in diagnosis.candidates),
+    ]
+    for share in (diagnosis.gap.closed, *probabilities):
         if not 0.0 <= share <= 1.0:
             raise ValueError(f"{share:g} is not a share from 0 to 1")
-    for given in (one for group in named for one in group.values()):
+    for given in (quantity for group in named for quantity in group.values()):
         dimension(given.unit)
         if given.std is not None and given.std < 0.0:
             raise ValueError(f"a standard deviation is {given.std:g}")
-    for spread in found.repeated.spreads:
+    for spread in diagnosis.repeated.spreads:
         if min(spread.width, *spread.interval) < 0.0:
             raise ValueError(f"the width of a scatter is {spread.width:g}")
-    units = {found.gap.misfit.unit, *([found.maps.unit] if found.maps else [])}
+    units = {diagnosis.gap.misfit.unit, *([diagnosis.maps.unit] if diagnosis.maps else [])}
     for unit in units - READING_UNITS:
         raise ValueError(f"{unit!r} is no unit of a reading")

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 FAMILY = "DejaVu Sans"
-"""matplotlib places the text of a figure by the widths of this font, which it ships."""
+"""The font, shipped with matplotlib, whose widths determine where it places the text of a figure."""
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 _TIMEOUT = 120.0  # s
 
@@ -42,8 +42,8 @@ class Byline:
     """Statements on the page that are not in the answer, because they would differ each time; empty: not shown.
 
     Args:
-        date: of the diagnosis, such as 2026-05-31.
-        notes: for the head of the page.
+        date: date of the diagnosis, such as 2026-05-31.
+        notes: notes for the head of the page.
         patch: file of the patched model.
     """
 
@@ -63,9 +63,10 @@ def write_report(answer: Findings, campaign: Campaign, path: Path, byline: Bylin
 
 
 def render_report(answer: Findings, campaign: Campaign, byline: Byline | None = None) -> str:
-    """The page as HTML that needs no other file and no network; the same for the same document and byline.
+    """The page as HTML that needs no other file and no network; equal documents and bylines give equal pages.
 
-    It begins with the answer in short. Printed, it is two pages, the first complete in itself; one without a gap.
+    It begins with the answer in short. Printed, it is two pages, the first complete in itself; without a gap,
+    one page.
     """
     from markupsafe import Markup
 
@@ -77,7 +78,8 @@ def render_report(answer: Findings, campaign: Campaign, byline: Byline | None = 
         if section.key == "patch" and byline.patch and section.blocks:
             blocks = (*blocks, Paragraph(f"The model is written to {byline.patch}."))
         html = as_html(blocks, drawn, titled=section.key != "head")
-        if section.key in ("head", "coefficients-section", "next"):  # narrow lines: none ends within a value
+        # narrow lines: no line ends within a value
+        if section.key in ("head", "coefficients-section", "next"):
             html = re.sub(r"(?<=\d) (?=%|to |N\b|rad\b)|(?<=\bN) (?=m\b)", "\u00a0", html)
         if html:
             parts[section.key] = {"title": section.title, "html": Markup(html)}
@@ -98,11 +100,11 @@ def render_report(answer: Findings, campaign: Campaign, byline: Byline | None = 
 _OPEN = ("head", "fit", "closes", "coefficients-section", "next")
 """Sections above the fold, which are the first printed page."""
 _PRINTED = ("answer", "found", "place", "costs", "cautions")
-"""Folded sections that are the second printed page."""
+"""Folded sections on the second printed page."""
 
 
 def render_fit(answer: Findings) -> str:
-    """The fit over the data as a separate HTML page; without a chart where the document has no ``maps``."""
+    """The fit over the data as a separate HTML page; without a chart if the document has no ``maps``."""
     from markupsafe import Markup
 
     drawing = fit_figure(answer.maps)
@@ -200,7 +202,7 @@ def security_policy() -> str:
 
 
 def font_face(characters: str) -> str:
-    """A rule of a style sheet with the font in WOFF, reduced to the characters that the figures show.
+    """A rule of a style sheet with the font in WOFF, reduced to the characters in the figures.
 
     The rule is deterministic. Characters that the font lacks are left to the browser's fonts.
     """
@@ -226,7 +228,7 @@ def find_browser() -> str:
     """The Chromium of this machine.
 
     Raises:
-        TunnelError: where there is none.
+        TunnelError: when there is none.
     """
     found = next(filter(None, map(shutil.which, BROWSERS)), None)
     if found is None:
@@ -242,7 +244,7 @@ def write_pdf(answer: Findings, campaign: Campaign, path: Path, byline: Byline |
     """Write the report of a diagnosis as a PDF of two pages, completely or not at all.
 
     Raises:
-        TunnelError: where there is no Chromium, it fails, or the file cannot be written.
+        TunnelError: when there is no Chromium, it fails, or the file cannot be written.
     """
     browser = find_browser()
     with tempfile.TemporaryDirectory() as name:
@@ -265,4 +267,4 @@ def write_pdf(answer: Findings, campaign: Campaign, path: Path, byline: Byline |
 
 
 _SIZED = ("@page {", "@page { size: 210mm 279mm;")
-"""The page of the PDF is as wide as A4 and as high as Letter, so that it is printed on both without scaling."""
+"""The page of the PDF is as wide as A4 and as high as Letter, so that it is printed on either without scaling."""

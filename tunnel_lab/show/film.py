@@ -1,8 +1,8 @@
 """A run from a plan or from a few options, and its film: the model beside the trace of its angle.
 
-Frames are rendered off-screen with OpenGL. Many machines lack some of its back ends, and a missing back end may end
-the whole process. Therefore a child process draws, trying one back end after another. The trace is drawn twice,
-faint and full; every frame shows the full trace up to its time.
+Frames are rendered off-screen with OpenGL. Many machines lack some of its back ends, and a missing back end may
+end the whole process. Therefore a child process draws, trying one back end after another. The trace is drawn
+twice, faint and full; every frame shows the full trace up to its time.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ BODY_SHARE = 0.52
 """Share of the width for the picture of the model."""
 FIRST_FRAME_S = 60.0
 """Time limit of a back end for its first frame, s."""
-_SHADOW, _SAMPLES = 2048, 4  # for a film: a quarter of a still's time, without visible difference
+_SHADOW, _SAMPLES = 2048, 4  # quality for a film: a quarter of a still's time, without visible difference
 
 REMEDY = "install EGL or OSMesa (Debian and Ubuntu: libegl1 or libosmesa6) to get the picture"
 _DPI = 100
@@ -55,7 +55,7 @@ _VERMILION = (213, 94, 0)
 
 
 PAPER = {"cn_beta": 0.4719, "cn_r": -0.1033}
-"""Coefficients of a run that no plan describes, 1/rad: the paper's Table IV, neural network."""
+"""Coefficients for a run without a plan, 1/rad: the paper's Table IV, neural network."""
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ def shown_run(request: Request) -> ShownRun:
         duration=_number("--duration", request.duration, condition.duration, 0.5, 600.0, "s"),
         spring_stiffness=condition.spring_stiffness if request.spring is None else rig.spring(request.spring),
     )
-    # Keep only this run, so that effects are checked against its spring alone.
+    # keep only this run, so that effects are checked against its spring alone
     plan = replace(plan, effects=plan.effects + added, conditions=(condition,))
     stated = run_settings(plan.truth, condition, sample_rate=plan.sensor.sample_rate)
     effects = plan_effects(plan)
@@ -159,7 +159,7 @@ def _number(option: str, given: float | None, plan: float, low: float, high: flo
 def backends() -> tuple[str, ...]:
     """The OpenGL back ends to try, best first: values for ``MUJOCO_GL``.
 
-    Where that variable is set, only its value; where the platform has only one back end, an empty string (MuJoCo's
+    If that variable is set, only its value; if the platform has only one back end, an empty string (MuJoCo's
     default).
     """
     chosen = os.environ.get("MUJOCO_GL")
@@ -181,14 +181,14 @@ def checked_camera(name: str) -> str:
 
 @dataclass(frozen=True)
 class Look:
-    """How a run is shown.
+    """The appearance of a film or a picture.
 
     Args:
-        width: pixels, even.
-        height: pixels, even.
+        width: width, pixels, even.
+        height: height, pixels, even.
         fps: frames per second of the film.
-        speed: of the film as a ratio; 0.5 is half as fast as the run.
-        camera: of ``mjcf/rig.xml``.
+        speed: speed of the film as a ratio; 0.5 is half as fast as the run.
+        camera: name of a camera of ``mjcf/rig.xml``.
         trace: whether the trace is shown beside the model.
     """
 
@@ -213,8 +213,8 @@ def write_film(
     A child process draws into a temporary folder; the result is then moved to its place.
 
     Args:
-        progress: called with (frames done, frames in all).
-        at: the frame, s from the release; None for the film.
+        progress: function called with (frames done, frames in all).
+        at: time of the frame, s from the release; None for the film.
 
     Raises:
         TunnelError: when the machine cannot render off-screen, the file cannot be written, or the run is shorter.
@@ -285,7 +285,7 @@ def frames(run: ShownRun, look: Look, times: NDArray[np.float64]) -> Iterator[Im
     """Pictures of the run; needs OpenGL in this process.
 
     Args:
-        times: ascending, shape (frames,), s from the release.
+        times: times of the frames, ascending, shape (frames,), s from the release.
 
     Yields:
         RGB, shape (height, width, 3).
@@ -320,9 +320,9 @@ class DrawnAxes:
     Args:
         faint: the whole trace in grey, shape (height, width, 3).
         full: the whole trace in colour, shape (height, width, 3).
-        time: of the samples, shape (n,), s.
-        columns: of the samples, shape (n,), pixels from the left.
-        rows: of the samples, shape (n,), pixels from the top.
+        time: times of the samples, shape (n,), s.
+        columns: positions of the samples, shape (n,), pixels from the left.
+        rows: positions of the samples, shape (n,), pixels from the top.
         top: first row of the axes, pixels.
         bottom: last row, pixels.
     """

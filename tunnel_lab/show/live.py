@@ -13,7 +13,7 @@ _NO_DISPLAY = "use tunnel render for a film"
 
 
 def missing_display() -> str:
-    """The reason why a window cannot be opened; empty where the environment shows none."""
+    """The reason why a window cannot be opened; empty if the environment shows no reason."""
     if sys.platform.startswith("linux") and not (
         os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     ):
@@ -24,10 +24,10 @@ def missing_display() -> str:
 def view_in_window(run: ShownRun, *, camera: str, speed: float) -> None:
     """Open MuJoCo's viewer and show the run from its release until the window is closed.
 
-    The viewer's reset knows neither the release nor the state of the plugin. Its reload has both.
+    The viewer's reset ignores the release and the state of the plugin. Its reload uses both.
 
     Args:
-        camera: of ``mjcf/rig.xml``.
+        camera: name of a camera of ``mjcf/rig.xml``.
         speed: factor on real time, at most 1 (ratio).
 
     Raises:

@@ -15,14 +15,14 @@ class Request:
     """The run, as options; None takes the value of the plan or the rig.
 
     Args:
-        plan: a campaign's description.
+        plan: path of a campaign's description.
         run: id of a run of the plan; None takes its first.
-        spring: number in the rig's table.
-        wind_speed: m/s.
-        release_angle_deg: degrees.
-        duration: s.
-        effects: ``NAME:PARAMETER=VALUE``, in addition to the plan's.
-        seed: of the sensor's noise and of random effects; None takes the plan's, or 1.
+        spring: number of the spring in the rig's table.
+        wind_speed: wind speed, m/s.
+        release_angle_deg: release angle, degrees.
+        duration: duration, s.
+        effects: effects as ``NAME:PARAMETER=VALUE``, in addition to the plan's.
+        seed: seed of the sensor's noise and of random effects; None takes the plan's, or 1.
     """
 
     plan: Annotated[

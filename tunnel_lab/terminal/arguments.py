@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 NO_EFFECT = "none"
-"""The name of the nominal model where an effect may be named."""
+"""The name of the nominal model in place of an effect."""
 HELP = (
     "Folder of the campaign: campaign.toml and its runs. Or one file of a data logger, as for tunnel import."
 )
@@ -52,7 +52,8 @@ def given_campaign(path: Path) -> Campaign:
     if path.suffix.lower() == ".toml":
         remedy = f"if it is a plan: tunnel simulate {shlex.quote(str(path))} --out FOLDER"
         raise TunnelError(f"is neither a record nor a {CAMPAIGN_FILE}", where=shown(path), remedy=remedy)
-    from tunnel_sim.files.importing.records import read_records  # only here: a campaign does not need it
+    # imported here because a campaign does not need it
+    from tunnel_sim.files.importing.records import read_records
     from tunnel_sim.vocabulary.turning_points import HoldsTurningPoints
 
     try:
@@ -68,7 +69,7 @@ def given_campaign(path: Path) -> Campaign:
 
 
 def file_hashes(path: Path) -> dict[str, str]:
-    """SHA-256 of the files that `given_campaign` read a campaign from.
+    """SHA-256 of the files from which `given_campaign` read a campaign.
 
     Returns:
         Hexadecimal digests by name in the campaign's folder: ``campaign.toml`` and the runs, or the one file.
@@ -201,7 +202,7 @@ def chosen_estimators(words: Sequence[str]) -> tuple[str, ...]:
 
 @contextmanager
 def own_code(estimators: Sequence[str]) -> Iterator[None]:
-    """End the command with status 1 where an estimator raises an exception or returns no valid estimate.
+    """End the command with status 1 if an estimator raises an exception or returns no valid estimate.
 
     The traceback of an exception in the user's code is printed.
     """
@@ -236,9 +237,9 @@ def refuse_unwritable_files(*paths: Path | None) -> None:
 
 
 def ending(*known: str) -> Callable[[Path | None], Path | None]:
-    """A callback of an option that takes a file; it refuses endings other than these, such as ``.html``.
+    """A callback of an option that takes a file; it accepts only these endings, such as ``.html``.
 
-    The output has one format, so another ending would be wrong. ``-`` and devices pass.
+    The output has one format, so another ending would be wrong. ``-`` and devices are accepted.
     """
 
     def checked(path: Path | None) -> Path | None:

@@ -1,4 +1,4 @@
-"""The options of a command, made from the types of its arguments, and options of every command."""
+"""The options of a command, made from the types of its arguments, and options common to all commands."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ EVERY = "As for every command"
 def with_fields(run: Callable[..., None]) -> Callable[..., None]:
     """A command with an option for each field of the dataclasses that it takes.
 
-    Parameters and fields are annotated as for Typer; a ``tuple[T, ...]`` may be given repeatedly. A mapping in the
-    annotation of a dataclass has other help texts for some of its fields, which then come last.
+    Parameters and fields are annotated as for Typer; a ``tuple[T, ...]`` may be given repeatedly. A mapping in
+    the annotation of a dataclass has other help texts for some of its fields, which then come last.
     """
     given = signature(run, eval_str=True).parameters.values()
     models: dict[str, Any] = {
@@ -43,12 +43,12 @@ def with_fields(run: Callable[..., None]) -> Callable[..., None]:
 
 
 def _parts(annotation: Any) -> tuple[Any, ...]:
-    """A type and all that is annotated to it."""
+    """A type and all its annotations."""
     return get_args(annotation) if get_origin(annotation) is Annotated else (annotation,)
 
 
 def _options(parameter: Parameter) -> Iterator[Parameter]:
-    """The parameter, or one for each field of its dataclass."""
+    """The parameter, or one option for each field of its dataclass."""
     model, *annotated = _parts(parameter.annotation)
     if not is_dataclass(model):
         yield parameter.replace(kind=Parameter.KEYWORD_ONLY)
@@ -66,13 +66,13 @@ def _options(parameter: Parameter) -> Iterator[Parameter]:
 
 
 def _is_repeated(option: Parameter) -> bool:
-    """Whether it has a tuple of any length."""
+    """Whether the type is a tuple of any length."""
     kind = _parts(option.annotation)[0]
     return get_origin(kind) is tuple and get_args(kind)[1:] == (...,)
 
 
 def _as_list(option: Parameter) -> Parameter:
-    """A repeated option as Typer takes it: a list, None by default."""
+    """A repeated option in Typer's form: a list, None by default."""
     if not _is_repeated(option):
         return option
     kind, word = _parts(option.annotation)
@@ -81,7 +81,7 @@ def _as_list(option: Parameter) -> Parameter:
 
 
 def with_format(run: Callable[..., None]) -> Callable[..., None]:
-    """A command with ``--quiet``, and ``--format`` for the tables that it prints."""
+    """A command with ``--quiet``, and with ``--format`` for its printed tables."""
     option = Option(
         "--format",
         metavar="FORMAT",
@@ -102,7 +102,7 @@ def with_quiet(run: Callable[..., None]) -> Callable[..., None]:
 def _with_option(
     run: Callable[..., None], name: str, kind: Any, variable: ContextVar[Any]
 ) -> Callable[..., None]:
-    """A command with one more option, whose value is in a variable while the command runs."""
+    """A command with one more option; its value is in a context variable while the command runs."""
     default = variable.get()
 
     @wraps(run)
@@ -118,7 +118,7 @@ def _with_option(
 
 
 def _declared(run: Callable[..., None], options: Iterable[Parameter]) -> Callable[..., None]:
-    """The command with a signature for Typer, which finds annotations only where they are not strings."""
+    """The command with a signature for Typer, which finds annotations only if they are not strings."""
     whole = Signature(list(options))
     vars(run)["__signature__"] = whole
     run.__annotations__ = {name: option.annotation for name, option in whole.parameters.items()}

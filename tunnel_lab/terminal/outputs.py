@@ -1,4 +1,4 @@
-"""Output of commands: blocks and lines, unchanged and in the format chosen."""
+"""Output of commands: blocks and lines, unchanged and in the chosen format."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def console(*, stderr: bool = False) -> Console:
 
 
 def say(line: str, *, stderr: bool = False) -> None:
-    """Print one line unchanged, so that paths can be copied; on standard error where tables are not text."""
+    """Print one line unchanged, so that paths can be copied; on standard error if tables are not text."""
     console(stderr=stderr or chosen.get() is not TableFormat.TEXT).print(line, soft_wrap=True)
 
 
@@ -50,12 +50,12 @@ def say_sentence(line: str) -> None:
 
 
 def say_written(*paths: Path | None, more: str = "", picture: Path | None = None) -> None:
-    """Print the paths of the files that were written, in a terminal as links that open them.
+    """Print the paths of the written files, in a terminal as links that open them.
 
     Args:
-        paths: None is left out.
+        paths: paths; None is left out.
         more: words after a path, in brackets.
-        picture: shows the content; its path ends the words.
+        picture: path of a file that shows the content; it ends the line.
     """
     for path in filter(None, paths):
         line = Text("Written: ").append_text(_link(path))
@@ -68,7 +68,7 @@ def say_written(*paths: Path | None, more: str = "", picture: Path | None = None
 
 
 def _link(path: Path) -> Text:
-    """A path as a link (OSC 8), which terminals that know none print as the path alone."""
+    """A path as a link (OSC 8); a terminal without support for links prints the path alone."""
     return Text(str(path), Style(link=path.resolve().as_uri()))
 
 
@@ -86,7 +86,7 @@ def show(blocks: Iterable[Block]) -> None:
 
 
 def _show_table(table: TextTable) -> None:
-    """Print a table in the format of ``--format``; one of text that is wider than the terminal, row by row."""
+    """Print a table in the format of ``--format``; a text table wider than the terminal is printed row by row."""
     out, kind = console(), chosen.get()
     if kind is not TableFormat.TEXT:
         out.print(rendered(table, kind), soft_wrap=True, end="")

@@ -15,10 +15,10 @@ from tunnel_lab.terminal.time_left import Reached
 
 @contextmanager
 def bar(what: str, total: int | None = None) -> Iterator[Callable[..., None]]:
-    """A progress bar on standard error, where that is a terminal; elsewhere nothing is printed.
+    """A progress bar on standard error, if that is a terminal; elsewhere nothing is printed.
 
     Args:
-        total: number of items, where it is known beforehand.
+        total: number of items, if known beforehand.
 
     Yields:
         A function to call with the number finished, the total and, if any, the name of the last item. The first
@@ -57,7 +57,7 @@ def bar_or_lines(
     """A progress bar for work of minutes; without a terminal, an occasional line on standard error.
 
     Args:
-        total: number of items, where it is known beforehand.
+        total: number of items, if known beforehand.
         every: time between two lines, s.
 
     Yields:
@@ -105,14 +105,14 @@ _sets_every: float | None = None
 
 
 def print_sets(every: float) -> None:
-    """From now on, without a terminal, also print tried sets of effects, at most one in ``every`` seconds."""
+    """From now on, without a terminal, also print the tried sets of effects, at most one in ``every`` seconds."""
     global _sets_every
     _sets_every = every
 
 
 @contextmanager
 def step_display() -> Iterator[Callable[[str], None]]:
-    """A spinner with step, effect tried, elapsed and remaining time; without a terminal, a line per step.
+    """A spinner with step, current effect, elapsed and remaining time; without a terminal, a line per step.
 
     Yields:
         The function to call with each step.
@@ -126,7 +126,7 @@ def step_display() -> Iterator[Callable[[str], None]]:
         """The time left, in words."""
 
         def render(self, _: Task) -> Text:
-            """As of now."""
+            """The text at this moment."""
             return Text(reached.words(time.perf_counter() - begun))
 
     columns = (

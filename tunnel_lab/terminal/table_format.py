@@ -1,4 +1,4 @@
-"""The output that a command was asked for: the format of its tables, and whether it prints errors only."""
+"""The requested output of a command: the format of its tables, and whether it prints errors only."""
 
 from __future__ import annotations
 

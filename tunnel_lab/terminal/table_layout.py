@@ -1,4 +1,4 @@
-"""Tables in a terminal: in columns, or row by row where it is too narrow; or as CSV, Markdown or JSON."""
+"""Tables in a terminal, in columns, or row by row if it is too narrow; or as CSV, Markdown or JSON."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from tunnel_lab.terminal.table_format import TableFormat
 from tunnel_sim.vocabulary.text_cells import as_text_cell
 
 PROSE = 30
-"""Columns: a longer cell is a sentence, which may be wrapped."""
-_PADDING, _BETWEEN = 2, 1  # columns beside a cell, and between two
-_FOLDED = 16  # columns: a first cell is not folded to less
+"""Maximum width of a cell in columns: a longer cell is a sentence, which may be wrapped."""
+_PADDING, _BETWEEN = 2, 1  # columns beside a cell, and between two cells
+_FOLDED = 16  # minimum width of a folded first cell, in columns
 _UNIT = re.compile(r"\[([^]]+)\]$")  # at the end of a heading
 _NUMBER = re.compile(r"[+-]?\d+(\.\d+)?(e[+-]?\d+)?")
 
@@ -31,7 +31,7 @@ _NUMBER = re.compile(r"[+-]?\d+(\.\d+)?(e[+-]?\d+)?")
 def rendered(table: TextTable, kind: TableFormat) -> str:
     """A table of texts as CSV, Markdown or JSON with a final line feed.
 
-    In JSON numeric cells become numbers, and empty ones in columns of numbers null.
+    In JSON numeric cells become numbers, and empty cells in columns of numbers become null.
     """
     if kind is TableFormat.MD:
         return as_markdown([table])
@@ -98,7 +98,7 @@ def is_too_wide(table: TextTable, width: int) -> bool:
 
 
 def _spare(table: TextTable, width: int) -> int:
-    """Columns left at this width; negative: so many are missing."""
+    """Columns left at this width; negative: number of missing columns."""
     return _room(table, width) - sum(_least_widths(table))
 
 
@@ -125,7 +125,7 @@ def without_shared(table: TextTable) -> tuple[TextTable, str]:
 
 
 def sectioned(table: TextTable) -> TextTable | None:
-    """A table with the names of each section in lines above its rows; None where no section has several rows."""
+    """A table with the names of each section in lines above its rows; None if no section has several rows."""
     places = list(range(table.sections))
     parts = [list(rows) for _, rows in groupby(table.rows, lambda row: row[: table.sections])]
     if not places or all(len(part) == 1 for part in parts):
@@ -143,7 +143,7 @@ def sectioned(table: TextTable) -> TextTable | None:
 
 
 def _named(table: TextTable, at: int, cell: str) -> str:
-    """A cell that stands above the others: a name, or a value with the unit of its heading."""
+    """A cell above the others: a name, or a value with the unit of its heading."""
     unit = _UNIT.search(table.columns[at])
     if table.columns[at] in table.names:
         return cell
@@ -151,7 +151,7 @@ def _named(table: TextTable, at: int, cell: str) -> str:
 
 
 def folded(table: TextTable, width: int) -> TextTable | None:
-    """A table whose long first cells are broken into lines to fit the width; None where that is not enough."""
+    """A table with long first cells broken into lines to fit the width; None if that is not enough."""
     least = _least_widths(table)[0]
     room = least + _spare(table, width)
     if room < _FOLDED or table.columns[0] in table.names:
@@ -161,7 +161,7 @@ def folded(table: TextTable, width: int) -> TextTable | None:
 
 
 def _broken(cell: str, room: int) -> list[str]:
-    """A cell in lines of some width, broken at blanks; a longer word at the last mark in it that fits."""
+    """A cell in lines of some width, broken at blanks; a longer word is broken at the last fitting mark."""
     lines = []
     for line in wrap(cell, room, break_long_words=False, break_on_hyphens=False) or [""]:
         left = line
@@ -198,7 +198,7 @@ def _unbroken(cell: str) -> list[str]:
 
 
 def stacked(table: TextTable, width: int) -> str:
-    """A table row by row: its first cell, and below it the others with their headings; empty ones are left out.
+    """A table row by row: its first cell, and below it the others with their headings; empty cells are left out.
 
     Sentences are wrapped to the width of the terminal; words are never broken.
     """

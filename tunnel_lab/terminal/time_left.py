@@ -1,8 +1,8 @@
 """The remaining time of a diagnosis, from its stage and the elapsed time.
 
-The number of sets of effects to fit is not known beforehand, so the answer is a range. At the start of a stage the
-ratio of remaining to elapsed time is taken as lognormal, with the percentiles of recorded diagnoses. During the
-stage, times that have already passed are ruled out.
+The number of sets of effects to fit is not known beforehand, so the answer is a range. At the start of a stage
+the ratio of remaining to elapsed time is taken as lognormal, with the percentiles of recorded diagnoses. During
+the stage, times that have already passed are ruled out.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ covered 86 % of them, and 84 % of the 100 diagnoses of a later blind set (seed 2
 there is no estimate: without a gap the answer follows at once."""
 _SPREAD = NormalDist().inv_cdf(0.9)
 _UNUSUAL = 0.98
-"""Share of the times that have already passed, above which no estimate is given."""
+"""Maximum share of the range that has already passed for an estimate to be given."""
 
 
 @dataclass(frozen=True)
@@ -34,8 +34,8 @@ class Reached:
     """The stage that a diagnosis has reached.
 
     Args:
-        stage: as `diagnosis.diagnose` reports it; empty before the first one.
-        begun: when the stage began, s since the start.
+        stage: stage as reported by `diagnosis.diagnose`; empty before the first one.
+        begun: start of the stage, s since the start.
     """
 
     stage: str = ""
@@ -45,10 +45,10 @@ class Reached:
         """The range of the remaining time, s, with a probability of 80 % for campaigns like the recorded ones.
 
         Args:
-            now: s since the start.
+            now: present time, s since the start.
 
         Returns:
-            None before a gap is found, and where a stage takes unusually long.
+            None before a gap is found, and if a stage takes unusually long.
         """
         if self.stage not in LEFT or self.begun <= 0.0:
             return None

@@ -125,8 +125,8 @@ class UnsteadyAeroLag(OutOfPhase):
     def unseen_form(self, cn_beta: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
         """To first order a lag only changes Cnr by a·Cnβ; runs show only the second-order remainder.
 
-        With two time constants, as in Jones's approximation (NACA Report 681, 1940), their mean is up to a third
-        below the single constant that fits best; the same is true for a phase lead.
+        With two time constants, as in Jones's approximation (NACA Report 681, 1940), their mean is up to a
+        third below the best-fitting single constant; the same is true for a phase lead.
         """
         del runs
         return 0.0, _UNSEEN_SHARE * abs(self.lag * cn_beta)
@@ -174,8 +174,9 @@ class ReynoldsDependence(Effect):
     def unseen_form(self, cn_beta: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
         """The coefficient at the mean speed depends on the form between the speeds of the runs.
 
-        A power law and a change that saturates within half an e-fold are fitted as the logarithm is, with weights
-        as of the moments. The truth may be between either of them and the logarithm: a rectangular half-width.
+        A power law, and a change that saturates within half an e-fold, are fitted like the logarithm, with the
+        weights of the moments. The truth may be between either of them and the logarithm: a rectangular
+        half-width.
         """
         if len(runs) < 2:
             return 0.0, 0.0
@@ -188,7 +189,7 @@ class ReynoldsDependence(Effect):
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
-        """None with one wind speed, whose Cnβ it leaves as it is."""
+        """None with one wind speed: its Cnβ absorbs the effect."""
         return super().trials(campaign) if len(campaign.wind_speeds) > 1 else ()
 
     @classmethod
@@ -277,7 +278,7 @@ class WindSpeedOffset(Effect):
 
 
 def _faster(series: Mapping[str, Series], grown: float) -> Mapping[str, Series]:
-    """Series of inputs with a greater wind speed, where another effect such as a drift has set it, m/s."""
+    """Inputs with a greater wind speed, m/s, if another effect, such as a drift, has already set a series."""
     given = series.get("wind_speed")
     if given is None:
         return series
@@ -315,7 +316,7 @@ class WindSpeedDrift(Effect):
     def unseen_form(self, cn_beta: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
         """Runs cannot show whether the stated speed holds at the release or is the mean over the run.
 
-        The truth may be between the two cases; their difference is a rectangular half-width.
+        The truth may be between the two cases; half their difference is a rectangular half-width.
         """
         mean = 1.0 + self.drift * mean_of_ramp(self.settling)
         return (abs(cn_beta * (mean**2 - 1.0)) / sqrt(3.0) if runs else 0.0), 0.0

@@ -21,13 +21,15 @@ SPRING_TOLERANCE = 1e-6
 """Relative difference below which two stiffnesses belong to the same spring."""
 
 NEAR_MOTION = 0.3
-"""Distance from the motion's frequency or a multiple within which a line is the motion's own, as a share of it."""
+"""Distance, as a share of the motion's frequency, from it or a multiple within which a line belongs to the
+motion."""
 
 HARMONICS = (2.0, 3.0)
 """Multiples of the motion's frequency at which its harmonics lie."""
 
-_NEAREST_MODE = 0.04  # of the motion's frequency: judgement; nearer, a nonlinear spring does the same
-_LEAST_BEATS = 0.5  # of two modes while both last: then they have been in phase and opposed; judgement
+# share of the motion's frequency: nearer, a nonlinear spring has the same effect; judgement
+_NEAREST_MODE = 0.04
+_LEAST_BEATS = 0.5  # beats of two modes while both last: they have then been in phase and opposed; judgement
 
 REFERENCE_RELEASE = 0.35
 """Release at which all forms of a second mode have the same amplitude, rad."""
@@ -51,7 +53,7 @@ class Effect(Traits):
 
     @classmethod
     def column(cls, effects: Sequence[Effect], name: str) -> Array:
-        """A parameter of several effects of the class, in its unit, shape (effects,)."""
+        """A parameter of several effects of one class, in its unit, shape (effects,)."""
         return np.array([getattr(effect, name) for effect in effects], np.float64)
 
     def draw(self, stated: RunSettings, rng: np.random.Generator) -> Drawn:
@@ -111,10 +113,10 @@ class Effect(Traits):
         """Change the physics of runs in place; by default, set the effect's terms of the moment law.
 
         Args:
-            runs: as the earlier effects left them.
+            runs: physics of the runs after the earlier effects.
             stated: as the campaign states them, without any effect.
-            effects: of every run; their parameters may differ from run to run.
-            drawn: of every run.
+            effects: effect in every run; their parameters may differ from run to run.
+            drawn: random draw in every run.
         """
         del stated, drawn
         first = 0
@@ -142,12 +144,12 @@ def beats_with(frequency: Array | float, motion: Array | float, lasting: Array |
     """Whether an oscillation near the motion is another mode: it beats with the motion while it lasts.
 
     Args:
-        frequency: of the oscillation, Hz.
+        frequency: frequency of the oscillation, Hz.
         motion: frequency of the motion, Hz.
         lasting: time for which the oscillation is seen, s.
 
     Returns:
-        True where it is, in the broadcast shape.
+        True if it is another mode, in the broadcast shape.
     """
     apart = np.abs(np.asarray(frequency) - motion)
     return np.asarray((apart > _NEAREST_MODE * np.asarray(motion)) & (apart * lasting >= _LEAST_BEATS))

@@ -1,6 +1,6 @@
 """Capabilities of effects beyond a term of the moment law: each is a type, and an effect may have two.
 
-A hook stands on the type that has it, so an effect without the capability is never asked.
+A hook belongs to the type of its capability, so it is never called for an effect without the capability.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from tunnel_sim.vocabulary.record import Array
 
 @dataclass(frozen=True)
 class BetweenRuns(Effect):
-    """A number of the run that is (1 + σ e) times as great as stated, with e drawn from the unit normal.
+    """A quantity of the run that is (1 + σ e) times its stated value, with e drawn from the unit normal.
 
     Traits of its own:
 
-    - ``scatters``: the number: ``wind_speed``, ``spring_stiffness`` or ``mechanical_damping``.
+    - ``scatters``: the quantity: ``wind_speed``, ``spring_stiffness`` or ``mechanical_damping``.
     """
 
     scatters: ClassVar[str]
@@ -43,7 +43,7 @@ class BetweenRuns(Effect):
     def on_runs(
         cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Self], drawn: Sequence[Drawn]
     ) -> None:
-        """Scale the number by every run's own factor."""
+        """Scale the quantity by every run's own factor."""
         del stated
         own = [effect.deviation(one) for effect, one in zip(effects, drawn, strict=True)]
         runs.deviate(cls.scatters, np.array(own))
@@ -57,7 +57,7 @@ class BetweenRuns(Effect):
     def departure(
         cls, spring: Array, damping: Array, air_stiffness: Array, air_damping: Array
     ) -> tuple[Array | float, Array | float, float]:
-        """Change of the runs' linear motions by a relative deviation of 1 of the scattering number.
+        """Change of the runs' linear motions by a relative deviation of 1 of the scattering quantity.
 
         Args:
             spring: Kr, N m/rad, shape (runs,).
@@ -66,14 +66,14 @@ class BetweenRuns(Effect):
             air_damping: Ca of the run, N m s/rad, shape (runs,).
 
         Returns:
-            Changes of the stiffness Kr − Ka, N m/rad, of the damping Cr − Ca, N m s/rad, and of the wind speed, a
-            share of it.
+            Changes of the stiffness Kr − Ka, N m/rad, of the damping Cr − Ca, N m s/rad, and of the wind speed,
+            as a share.
         """
 
 
 @dataclass(frozen=True)
 class OwnNumbers(Effect):
-    """An effect with unknowns of its own in every run, which the residuals of a fit without it show."""
+    """An effect with unknowns of its own in every run; the residuals of a fit without the effect show them."""
 
     autonomous = False
 
@@ -89,7 +89,7 @@ class OwnNumbers(Effect):
 
     @classmethod
     def gains_in(cls) -> Literal["frequency", "harmonics"]:
-        """The channel of the misfit that its unknowns of every run lower by chance."""
+        """The channel of the misfit that these unknowns lower by chance."""
         return "harmonics"
 
     @classmethod
@@ -98,7 +98,7 @@ class OwnNumbers(Effect):
         """Starting points of a fit.
 
         Args:
-            residuals: of a fit without it.
+            residuals: residuals of a fit without the effect.
 
         Returns:
             The result of the search in the residuals, for each way in which the effect may act.
@@ -107,12 +107,12 @@ class OwnNumbers(Effect):
 
 @dataclass(frozen=True)
 class Periodic(OwnNumbers):
-    """An oscillation whose phase differs from run to run.
+    """An oscillation with a phase that differs from run to run.
 
     Traits of its own:
 
-    - ``frequency_by_wind``: the parameter of the moment law whose frequency is proportional to the wind speed;
-      empty: none.
+    - ``frequency_by_wind``: the parameter of the moment law with a frequency proportional to the wind speed;
+    empty: none.
     """
 
     frequency_by_wind: ClassVar[str] = ""
@@ -148,7 +148,7 @@ class Clock(OwnNumbers):
 
     @classmethod
     def gains_in(cls) -> Literal["frequency", "harmonics"]:
-        """An instant moves the phase."""
+        """The channel of the frequency: an instant moves the phase."""
         return "frequency"
 
     @abstractmethod
@@ -180,7 +180,7 @@ class ReadingEffect(Effect):
         """Change the angle that the sensor measures, before zero and noise are added.
 
         Args:
-            angle: of the rod's upper end, rad, shape (n,).
+            angle: angle of the rod's upper end, rad, shape (n,).
             time_s: true times, s, shape (n,).
 
         Returns:
@@ -197,7 +197,7 @@ class ReadingEffect(Effect):
         """Change the reading after noise and before quantisation.
 
         Args:
-            reading: rad, shape (n,).
+            reading: reading, rad, shape (n,).
 
         Returns:
             The changed reading, rad, shape (n,).
@@ -207,11 +207,11 @@ class ReadingEffect(Effect):
 
 @dataclass(frozen=True)
 class SecondOscillation(Periodic, ReadingEffect):
-    """An oscillation beside the body's, of a structure or another degree of freedom.
+    """An oscillation apart from the body's, of a structure or another degree of freedom.
 
     Traits of its own:
 
-    - ``resembles``: other channels that its residual may point to.
+    - ``resembles``: other channels to which its residual may point.
     """
 
     resembles: ClassVar[tuple[Channel, ...]] = ()
@@ -222,24 +222,24 @@ class SecondOscillation(Periodic, ReadingEffect):
 
         Args:
             time_s: true times since the release, s, shape (n,).
-            stated: the input of a driven run is the acting one.
+            stated: stated physics of the run; its input, if it is driven, is the acting one.
             derivative: which derivative of the angle the sensor measures: 0, 1 or 2.
 
         Returns:
-            rad, rad/s or rad/s², shape (n,), to be added to the angle or its derivative.
+            The oscillation, rad, rad/s or rad/s², shape (n,), to be added to the angle or its derivative.
         """
 
 
 @dataclass(frozen=True)
 class MainsPickup(Periodic, ReadingEffect):
-    """A line of the mains, which is read off the records."""
+    """A line of the mains, detected in the records."""
 
     fitted = False
 
 
 @dataclass(frozen=True)
 class CoarseSteps(ReadingEffect):
-    """Steps of the reading coarser than stated, which are read off the records."""
+    """Steps of the reading coarser than stated, detected in the records."""
 
     fitted = False
 
@@ -259,11 +259,12 @@ class Backlash(Effect):
 
 @dataclass(frozen=True)
 class AtRandom(Effect):
-    """A random moment, which differs from run to run.
+    """A random moment, different from run to run.
 
     Traits of its own:
 
-    - ``random``: kind of its spectrum. That of vortex shedding also has a line: its phase may wander or not.
+    - ``random``: kind of its spectrum. The spectrum of vortex shedding also has a line with a steady or
+      wandering phase.
     """
 
     random: ClassVar[Literal["broad_band", "narrow_band"]]
@@ -289,10 +290,11 @@ class Friction(Effect):
 
     @abstractmethod
     def stands(self, stiffness: float) -> float:
-        """Greatest angle from rest at which it holds a body that has stopped.
+        """Greatest angle from rest at which the friction holds a body that has stopped.
 
         Args:
-            stiffness: of the restoring moment, N m/rad, or per unit inertia, as the effect's moment.
+            stiffness: stiffness of the restoring moment, N m/rad, or per unit inertia, like the effect's
+                moment.
 
         Returns:
             The angle, rad.
@@ -303,7 +305,7 @@ class Friction(Effect):
         """The friction while the body moves at a steady rate, against the motion.
 
         Args:
-            rate: above 0, rad/s, shape (n,).
+            rate: positive rate, rad/s, shape (n,).
 
         Returns:
             The moment, N m, shape (n,).
@@ -316,10 +318,10 @@ class OutOfPhase(Effect):
 
     @abstractmethod
     def in_phase(self, cn_beta: float, cn_r: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
-        """Cnβ and Cnr in phase with angle and rate, with the part of this effect, 1/rad.
+        """Cnβ and Cnr in phase with angle and rate, including this effect's part, 1/rad.
 
         Args:
             cn_beta: Cnβ of the law beside the effect, 1/rad.
-            cn_r: Cnr of that law, 1/rad.
-            runs: the campaign's wind-on runs, whose frequencies count equally.
+            cn_r: Cnr of the same law, 1/rad.
+            runs: the campaign's wind-on runs; their frequencies count equally.
         """

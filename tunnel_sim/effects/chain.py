@@ -24,7 +24,8 @@ class EffectChain:
     Args:
         effects: in the order in which they act.
         drawn: the random part of each effect in this run.
-        deviations: of the true wind speed, spring and mechanical damping from what is stated, relative, by name.
+        deviations: relative deviations of the true wind speed, spring and mechanical damping from their stated
+            values, by name.
     """
 
     stated: RunSettings
@@ -39,7 +40,7 @@ class EffectChain:
         Args:
             effects: in the order in which they act.
             rng: parent generator. Each effect draws from generators spawned from it, one for the motion and one
-                for the sensor, so an effect never changes what is later drawn from ``rng`` itself.
+                for the sensor, so an effect never changes later draws from ``rng`` itself.
         """
         motion, sensor = rng.spawn(len(effects)), rng.spawn(len(effects))
         drawn = tuple(
@@ -77,15 +78,16 @@ class EffectChain:
         """The sensor's view of a motion, before its zero and noise.
 
         Args:
-            motion: of the rod's upper end, as long as `physics` requires.
-            time_s: of the samples by their time stamps, s, shape (n,); need not be the times of the motion.
+            motion: motion of the rod's upper end, as long as `physics` requires.
+            time_s: times of the samples by their time stamps, s, shape (n,); they may differ from the times of
+                the motion.
             derivative: which derivative of the angle the sensor measures: 0, 1 or 2.
 
         Returns:
-            The measured angle, rad, or its derivative, rad/s or rad/s², shape (n,); cubic between the motion's own
-            times.
+            The measured angle, rad, or its derivative, rad/s or rad/s², shape (n,); cubic between the times of
+            the motion.
         """
-        from scipy.interpolate import CubicHermiteSpline  # only here: slow to load
+        from scipy.interpolate import CubicHermiteSpline  # imported here because it is slow to load
 
         true = self.true_times(time_s)
         path = CubicHermiteSpline(motion.time_s, motion.angle, motion.rate)
@@ -95,7 +97,7 @@ class EffectChain:
         """The angle measured by the sensor, before zero and noise are added.
 
         Args:
-            angle: of the rod's upper end, or its derivative, rad, rad/s or rad/s², shape (n,).
+            angle: angle of the rod's upper end, or its derivative, rad, rad/s or rad/s², shape (n,).
             time_s: true times since the release, s, shape (n,).
             derivative: which derivative of the angle the sensor measures: 0, 1 or 2.
 
@@ -151,7 +153,7 @@ def with_effects(
     """The physics of runs with their effects; a spring with a moving root acts with its true stiffness.
 
     Args:
-        effects: of every run, in the order in which they act; all runs have the same classes.
+        effects: effects of every run, in the order in which they act; all runs have the same classes.
         drawn: the random part of each effect, by run.
         deviations: as in `EffectChain`, by run.
     """
@@ -168,7 +170,7 @@ def with_effects(
 
 
 def reads_plainly(effects: Sequence[Effect]) -> bool:
-    """Whether none of some effects changes the measured angle or the reading."""
+    """Whether no effect in a list changes the measured angle or the reading."""
     return not any(
         isinstance(effect, Clock) or _of_angle(effect) or _overrides(effect, "on_reading")
         for effect in effects
@@ -206,7 +208,7 @@ def quantise(reading: Array, step: float) -> Array:
     """Round to a multiple of the resolution.
 
     Args:
-        reading: rad, any shape.
-        step: rad; 0: the reading is unchanged.
+        reading: reading, rad, any shape.
+        step: resolution, rad; 0: the reading is unchanged.
     """
     return np.round(reading / step) * step if step > 0.0 else reading

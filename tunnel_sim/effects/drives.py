@@ -1,8 +1,9 @@
 """Effects of the actuator of a driven run: its lag, its greatest moment and its greatest rate of change.
 
-They change the moment on the body that the run file states, not the motion of a root or a base. Between its samples
-the input is held or linear, as the run states. In any combination, the moment is first clipped, then limited in its
-rate, then lagged. At the start of a recorded run the actuator has settled at its first sample.
+They change the moment on the body that the run file states, not the motion of a root or a base. Between its
+samples the input is held or linear, as the run states. In any combination, the moment is first clipped, then
+its rate is limited, then it is lagged. At the start of a recorded run the actuator has settled at its first
+sample.
 """
 
 from __future__ import annotations
@@ -20,18 +21,18 @@ from tunnel_sim.physics.run_settings import SettingsTable
 
 _FRANKLIN = "Franklin, Powell & Emami-Naeini, Feedback Control of Dynamic Systems, 8th ed., Pearson 2019"
 _SLOW = 0.03
-"""Least ωτ of a lag: the gain of a faster one falls by (ωτ)²/2, less than half a thousandth, and it is a delay."""
+"""Minimum ωτ of a lag. The gain of a faster lag falls by (ωτ)²/2, less than half a thousandth: it is a delay."""
 _LIMITS = (0.95, 0.85, 0.7, 0.5, 0.3)
-"""Greatest moments that are tried, over the greatest one asked for."""
+"""Tried limits of the moment, over the greatest demanded moment."""
 _SOFT_LIMITS, _SOFT = (3.0, 1.5, 0.75), 0.45
-"""Soft limits over the greatest moment asked for, and their softness, which is close to a hyperbolic tangent."""
+"""Tried soft limits over the greatest demanded moment, and their softness, close to a hyperbolic tangent."""
 _RATES = (0.8, 0.5, 0.3, 0.15, 0.06, 0.02, 0.007)
-"""Greatest rates that are tried, over the greatest one asked for: of a smooth input, and of one that jumps."""
+"""Tried limits of the rate, over the greatest demanded rate: for a smooth input, and for one that jumps."""
 
 
 @dataclass(frozen=True)
 class ActuatorEffect(Effect):
-    """The actuator of a moment on the body, not the motion of a root or a base: each effect sets a property."""
+    """The actuator of a moment on the body, not of the motion of a root or a base: each effect sets a property."""
 
     channel = "forcing"
     condition = "always"
@@ -143,6 +144,6 @@ class ActuatorLag(ActuatorEffect):
     )  # fmt: skip
 
     def plausible(self, omega: float, duration: float) -> bool:
-        """Whether it is more than a delay of the input to the motion: at least as slow as `_SLOW`."""
+        """Whether the lag is more than a delay between input and motion: at least as slow as `_SLOW`."""
         del duration
         return self.lag * omega > _SLOW

@@ -1,4 +1,4 @@
-"""Searches in the residuals of a fit without an effect, for the effect's own parameters in every run."""
+"""Searches for an effect's own parameters in every run, in the residuals of a fit without the effect."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ class Sought:
 
     Args:
         values: of the parameters of the effect's textbook form, in their order and units.
-        numbers: of every run its phase (rad), shape (runs,), or its instants (shares of the run), shape (runs, n).
-        drop: of χ² by removing the effect, dimensionless.
+        numbers: phase of every run (rad), shape (runs,), or its instants (shares of the run), shape (runs, n).
+        drop: drop of χ² when the effect is removed, dimensionless.
         of_input: the value of the parameter that relates the effect to the input, dimensionless.
     """
 
@@ -26,7 +26,7 @@ class Sought:
 
 
 class Residuals(Protocol):
-    """The residuals of a fit, with searches that effects share; each gives None where nothing can be found."""
+    """The residuals of a fit, with searches that effects share; each returns None if nothing is found."""
 
     def mains_line(self) -> Sought | None:
         """The strongest line at a frequency of the mains in the readings: amplitude (rad) and frequency (Hz)."""
@@ -37,10 +37,10 @@ class Residuals(Protocol):
         Args:
             least: least ratio of frequency times size to wind speed, dimensionless.
             greatest: greatest such ratio, dimensionless.
-            size: of the body in that ratio: ``width`` or ``length``.
+            size: size of the body in this ratio: ``width`` or ``length``.
 
         Returns:
-            Its moment coefficient and that ratio.
+            The moment coefficient and this ratio.
         """
 
     def ringing(self) -> Sought | None:
@@ -53,5 +53,5 @@ class Residuals(Protocol):
         """The instants at which the runs jump ahead by one common time, and that time (s).
 
         Args:
-            with_input: whether the input of driven runs jumps too.
+            with_input: whether the input of driven runs jumps as well.
         """

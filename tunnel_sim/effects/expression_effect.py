@@ -40,7 +40,7 @@ class ExpressionParameter:
 
     Args:
         unit: as `tunnel_sim.vocabulary.dimensions.dimension` reads it.
-        scale, lower, upper, default: a typical value, its bounds, and the value where none is given, in the unit.
+        scale, lower, upper, default: a typical value, its bounds, and the value if none is given, in the unit.
     """
 
     unit: str
@@ -119,7 +119,7 @@ class _Moment(ExpressionEffect):
 
 class _Reading(ExpressionEffect, ReadingEffect):
     def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
-        """Apply the characteristic."""
+        """Apply the characteristic of the reading."""
         del drawn
         if not self._acts(stated):
             return angle
@@ -140,7 +140,7 @@ def expression_effect(
 ) -> type[Effect]:
     """An effect whose moment or reading is an expression; the class is not registered.
 
-    Its first parameter is the severity. Refused where the effect acts at its null, does nothing beyond it or
+    Its first parameter is the severity. The effect is refused if it acts at its null, does nothing beyond it or
     has no value somewhere.
 
     Args:
@@ -173,7 +173,7 @@ def expression_effect(
     unused = [symbol for symbol in parameters if symbol not in formula.names]
     if unused:
         raise TunnelError(f"parameter {unused[0]} is not in {text!r}", remedy="use it or leave it out")
-    # refused where it acts at its null, does nothing beyond it or has no value somewhere
+    # refused if it acts at its null, does nothing beyond it or has no value somewhere
     null = "0" if reading is None else "y"
     rng = np.random.default_rng(0)
     tried = {key: top * rng.uniform(-1.0, 1.0, 200) for key, top in _TRIED.items()}
@@ -250,7 +250,7 @@ def _check_names(parameters: Mapping[str, ExpressionParameter]) -> None:
 
 def read_effects(path: Path) -> tuple[type[Effect], ...]:
     """The effects of an effects file (docs/how-to/add-an-effect.md) in its order; they are not registered."""
-    from tunnel_sim.files.plan_file import EffectsDocument  # only here: slow to load
+    from tunnel_sim.files.plan_file import EffectsDocument  # imported here because it is slow to load
     from tunnel_sim.files.toml_input import load_toml, validate
 
     missing = "name an effects file; docs/how-to/add-an-effect.md has an example"
@@ -265,7 +265,7 @@ def read_effects(path: Path) -> tuple[type[Effect], ...]:
         try:
             quantities: dict[str, ExpressionParameter] = {}
             for name, given in table.parameters.items():
-                usual = given.scale if quantities else 0.0  # the first one is the severity
+                usual = given.scale if quantities else 0.0  # the first parameter is the severity
                 default = usual if given.default is None else given.default
                 meaning = given.meaning or f"parameter {name}"
                 sizes = (given.scale, given.lower, given.upper, default)

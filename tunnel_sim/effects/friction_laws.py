@@ -15,10 +15,11 @@ from tunnel_sim.effects.traits import Text
 from tunnel_sim.physics.run_settings import SettingsTable
 from tunnel_sim.vocabulary.record import Array
 
-# At 2 rad/s, saturating friction has risen to 96 %, and 2 % of a peak remain. Beyond, it would resemble damping.
+# At 2 rad/s, saturating friction has risen to 96 %, and 2 % of a peak remain. A slower change would resemble
+# damping.
 _LOW_RATE = 1.0  # rad/s
-_SHOWN = 2.0  # standard deviations from which a presliding range goes beyond the textbook form
-_UNCHANGED_AT = 2.0  # rad/s: where the power of the rate is 1, as in the compiled law
+_SHOWN = 2.0  # standard deviations at which a presliding range differs from the textbook form
+_UNCHANGED_AT = 2.0  # rad/s: rate at which the power of the rate is 1, as in the compiled law
 #: Forms of friction by parameters of the moment law.
 CONTACT = {
     "presliding": "presliding",
@@ -36,16 +37,17 @@ AGAINST_RATE = ("friction_exponent", "friction_saturation", "friction_peak")
 class CoulombFriction(Friction):
     """Dry friction, as in bearings, seals and gears.
 
-    With a presliding range the contact deflects before it slides (Dahl 1968; Canudas de Wit et al. 1995,
-    doi 10.1109/9.376053): z is the deflection, zero at the release; zs is the deflection at which it slides;
-    2 Tc/zs is the stiffness just after the sliding reverses.
+    With a presliding range the contact deflects before it slides (Dahl 1968; Canudas de Wit et al. 1995, doi
+    10.1109/9.376053): z is the deflection, zero at the release; zs is the deflection at which it slides; 2
+    Tc/zs is the stiffness just after the sliding reverses.
 
     Sliding friction depends on the rate in three ways: it rises as a power less than one, it saturates, or it has a
     peak near rest (Armstrong-Hélouvry et al. 1994). All of them leave the friction less than proportional to the
     rate, which separates the family from damping.
 
-    In a joint, friction grows with the moment carried (Hamon, Gautier & Garrec 2011): gravity's or the moment of
-    an actuator, whichever is greater, since they act on the two sides of the joint. The moment of a spring does not
+    In a joint, friction grows with the moment carried (Hamon, Gautier & Garrec 2011): gravity's or an
+    actuator's, whichever is greater, because they act on the two sides of the joint. The moment of a spring
+    does not
     count: friction proportional to it is structural damping.
     """
 
@@ -86,7 +88,7 @@ class CoulombFriction(Friction):
         scale=0.005,
         lower=0.0,
         upper=0.2,
-        fit_lower=5e-4,  # below it the contact moves faster than the integrator steps
+        fit_lower=5e-4,  # below this rate the contact moves faster than the integrator steps
         form=True,
     )
     exponent: float = parameter(
@@ -146,12 +148,12 @@ class CoulombFriction(Friction):
         return words.removesuffix(",")
 
     def stands(self, stiffness: float) -> float:
-        """The angle at which the spring's moment equals the friction at rest, rad; 0 where the latter vanishes."""
+        """The angle at which the spring's moment equals the friction at rest, rad; 0 if this friction vanishes."""
         return self.at_rest / stiffness if stiffness > 0.0 else 0.0
 
     @property
     def at_rest(self) -> float:
-        """The friction that holds a body at rest without a load, N m; 0 where it vanishes with the rate."""
+        """The friction that holds a body at rest without a load, N m; 0 if it vanishes with the rate."""
         rises = self.exponent > 0.0 or self.saturation > 0.0
         return 0.0 if rises else self.friction_moment * (1.0 + self.peak)
 
@@ -159,7 +161,7 @@ class CoulombFriction(Friction):
         """The friction at a steady rate without a load, when the contact has deflected fully, N m, shape (n,).
 
         Args:
-            rate: above 0, rad/s, shape (n,).
+            rate: positive rate, rad/s, shape (n,).
         """
         power = (rate / _UNCHANGED_AT) ** self.exponent
         rise = np.tanh(rate / self.saturation) if self.saturation > 0.0 else 1.0

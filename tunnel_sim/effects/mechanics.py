@@ -16,7 +16,7 @@ from tunnel_sim.effects.traits import Text
 from tunnel_sim.physics.expression import parse
 from tunnel_sim.physics.run_settings import RodTwist, SettingsTable
 
-_RINGING_STEP = 0.02  # relative: the half-power width of a rod's ringing, whose damping is 1 % of critical
+_RINGING_STEP = 0.02  # relative: the half-power width of a rod's ringing with a damping of 1 % of critical
 
 
 @dataclass(frozen=True)
@@ -128,15 +128,15 @@ class GravityStiffness(Effect):
         upper=3.2,
         fit_lower=-1.6,  # beyond a right angle the same moment has the opposite sign of Kg
         fit_upper=1.6,
-        beside_spring=True,  # without a spring it cannot be separated from the sensor's zero
+        beside_spring=True,  # without a spring the effect cannot be separated from the sensor's zero
     )
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
-        """Gravity beside stated springs, or in place of an unstated one.
+        """Gravity together with stated springs, or instead of an unstated spring.
 
-        An unstated spring absorbs a small gravity except for its curvature. In place of the spring, gravity leaves
-        the frequency of small swings unchanged, so that the curvature shows.
+        An unstated spring absorbs a small gravity except for its curvature. Gravity that replaces the spring
+        leaves the frequency of small swings unchanged, so that the curvature shows.
         """
         (trial,) = super().trials(campaign)
         return (replace(trial, replaces="stiffness") if campaign.normalised else trial,)
@@ -213,7 +213,7 @@ class RodFlexibility(Effect):
     def small_swings(
         cls, stiffness: float, damping: float, values: Mapping[str, float]
     ) -> tuple[float, float]:
-        """The slow one of the two modes, in which the rod twists little."""
+        """The slow mode, in which the rod twists little."""
         twist, share = values["compliance"], values["inertia_share"]
         if twist <= 0.0 or stiffness <= 0.0:
             return stiffness, damping
@@ -276,7 +276,7 @@ class SpringMiscalibration(Effect):
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
-        """Every spring, if there is another for comparison."""
+        """Every spring, if there is another spring for comparison."""
         springs = campaign.springs if len(campaign.springs) > 1 else ()
         scale = cls.parameters()[0].scale
         return [Trial({"error": scale, "spring_stiffness": spring}, "error") for spring in springs]
@@ -314,7 +314,7 @@ class QuadraticDamping(Effect):
     )  # fmt: skip
     exponent: float = exponent(
         "n", "power of the rate in the moment (unchanged at 2 rad/s)", 2.0, fit_lower=1.0
-    )  # a lower power is dry friction
+    )  # with a lower power it would be dry friction
 
 
 _AFTER_EFFECT = parse("size*log((t + lead)/length)", frozenset({"size", "t", "lead", "length"}))
@@ -358,8 +358,8 @@ class StructuralDamping(Effect):
     ) -> None:
         """Add the loss and, where the body was held at its release angle, the spring's after-effect.
 
-        A loss equal at all frequencies comes from relaxing elements at all frequencies. The slow ones have yielded
-        to the release angle, and recover while the body swings.
+        An equal loss at all frequencies comes from relaxing elements at all frequencies. The slow elements have
+        yielded to the release angle, and recover while the body swings.
         """
         del drawn
         loss, after_effect = cls.column(effects, "loss_factor"), cls.column(effects, "after_effect")
@@ -377,8 +377,8 @@ class StructuralDamping(Effect):
     def unseen_form(self, cn_beta: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
         """Runs cannot show which frequency determines the loss: the motion's, or the rig's in still air.
 
-        Causality may also stiffen the spring by (2η/π) ln(ω/ωn) (Crandall 1970). The truth may be between
-        the two cases; their difference is a rectangular half-width.
+        Causality may also stiffen the spring by (2η/π) ln(ω/ωn) (Crandall 1970). The truth may be between the
+        two cases; half their difference is a rectangular half-width.
         """
         del cn_beta
         if not runs:

@@ -16,10 +16,10 @@ from tunnel_sim.vocabulary.dimensions import angle_power
 from tunnel_sim.vocabulary.record import Array
 
 SWING = 0.3
-"""Least swing that the ranges of the parameters are meant for, rad: a release at 20 degrees stays above it."""
+"""Least swing for the ranges of the parameters, rad: a release at 20 degrees stays above it."""
 
 LEAST_EXPONENT = 0.25
-"""Smallest exponent: below it a term is nearly a jump, which the integration steps do not resolve."""
+"""Smallest exponent: with a smaller one a term is nearly a jump, which the integration steps do not resolve."""
 
 DESCRIPTION = "parameter"
 """Key of a field's metadata with its `ParameterInfo`."""
@@ -34,20 +34,22 @@ class ParameterInfo:
         unit: SI, angles in rad.
         scale: a typical value for this rig, for steps and starting values.
         lower, upper: least and greatest value allowed, in the unit.
-        default: value where none is given, in the unit; zero for the severity.
-        fit_lower, fit_upper: least and greatest value a fit of swings from `SWING` on may take, in the unit.
-        rate_exponent: name of the parameter that is the exponent of the rate in its term; empty: none.
+        default: value if none is given, in the unit; zero for the severity.
+        fit_lower, fit_upper: least and greatest value that a fit of swings from `SWING` on may take, in the
+            unit.
+        rate_exponent: name of the parameter that is the exponent of the rate in this parameter's term; empty:
+            none.
         beside_spring: whether it can be fitted only beside a spring of stated stiffness; else it is fixed.
         chosen_spring: whether it is the stiffness of one of the campaign's springs: chosen, not fitted.
         per_pressure: whether it multiplies ½ρV²Al, so that its unit depends on which sizes are stated.
-        inside: whether a fit at one of its bounds calls for another law, as with a free exponent.
-        of_input: whether it relates the effect to the input of a driven run; values are tried and not fitted. Free
+        inside: whether a fit at one of its bounds suggests another law, as for a free exponent.
+        of_input: whether it relates the effect to the input of a driven run; values are tried, not fitted. Free
             decays do not depend on it.
         along_run: whether it shapes a change along the run.
         of_load: whether it relates the effect to the moment that the joint carries; it can be fitted only where
             gravity or an actuator makes this moment vary.
-        relative: whether it is a relative change, which people read in per cent; its unit is ``1``.
-        name: of the field in the effect's class, from which it is taken.
+        relative: whether it is a relative change, shown in per cent; its unit is ``1``.
+        name: name of the field in the effect's class, from which it is taken.
     """
 
     symbol: str
@@ -90,7 +92,7 @@ class ParameterInfo:
                 greater, and a least angle smaller: the ratios of the moments are unchanged.
 
         Returns:
-            Both, in the unit.
+            Both values, in the unit.
         """
         if "rad" not in self.unit or not 0.0 < swing < SWING:
             return self.fit_lower, self.fit_upper
@@ -165,8 +167,8 @@ class Circumstances:
     Args:
         greatest_reading: greatest absolute reading of any run, rad.
         wind_speeds: settings of the wind, m/s, the slowest first; empty without wind.
-        greatest_moment: greatest demand of an input, N m, from the fit without the effect; 0 if none moves the
-            body.
+        greatest_moment: greatest demand of an input, N m, from the fit without the effect; 0 if no input moves
+            the body.
         fastest_moment: greatest demanded rate of change of an input, N m/s, from sample to sample.
     """
 
@@ -183,9 +185,9 @@ class Trial:
     """Starting values for the fit of an effect.
 
     Args:
-        at_most: greatest absolute value that linear theory may give it, in its unit.
-        second_order: whether the nominal coefficients absorb its first order, so that its square shows.
-        passive: whether a passive part can have this sign; an upper limit is stated for such a sign alone.
+        at_most: greatest absolute value that linear theory may give the parameter, in its unit.
+        second_order: whether the nominal coefficients absorb its first order, so that only its square shows.
+        passive: whether a passive part can have this sign; an upper limit is stated for such a sign only.
     """
 
     values: Mapping[str, float]
@@ -214,5 +216,5 @@ class WindOnRun:
 
 
 def moment_scale(info: ParameterInfo, campaign: Circumstances) -> float:
-    """Factor on a typical value: 10 for a moment in normalised form, divided by about 0.1 kg m², else 1."""
+    """Factor on a typical value: 10 for a moment in normalised form (per inertia of about 0.1 kg m²), else 1."""
     return 10.0 if campaign.normalised and info.unit.startswith("N m") else 1.0

@@ -66,7 +66,7 @@ class RandomMoment(AtRandom):
                 runs.series[place] = {**runs.series[place], cls.source: cls._moment(effect, own)}
 
     def _moment(self, drawn: Drawn) -> Series:
-        from scipy.signal import lfilter  # here, because it is slow to load
+        from scipy.signal import lfilter  # imported here because it is slow to load
 
         white, decay = self.drawn_numbers(drawn), exp(-2.0 * pi * self.corner * _INTERVAL)
         kicks = np.concatenate([white[:1], sqrt(1.0 - decay**2) * white[1:]])
@@ -104,8 +104,8 @@ class Buffeting(RandomMoment):
 class AmbientVibration(RandomMoment):
     """A random moment from the surroundings: floor, microseisms, traffic, draughts.
 
-    A base that shakes at random acts as a moment too: its angular acceleration times the inertia, or its linear
-    acceleration times mass and arm.
+    A base that shakes at random acts as a moment, too: its angular acceleration times the inertia, or its
+    linear acceleration times mass and arm.
     """
 
     name = "ambient_vibration"

@@ -93,11 +93,11 @@ def check_described(kind: object) -> None:
 
 
 def built_in(kinds: Iterable[type[Effect]]) -> tuple[type[Effect], ...]:
-    """Effects of this package by their place in the vocabulary, with the checks of users' effects.
+    """Effects of this package by their place in the vocabulary, with the same checks as users' effects.
 
     Args:
-        kinds: classes; bases are left out: classes without a name from which others derive, or whose own name
-            begins with ``_``.
+        kinds: classes; base classes are left out: classes without a name from which others derive, and private
+            ones.
 
     Raises:
         TunnelError: when an effect is not complete, or its place is missing or taken.
@@ -147,10 +147,10 @@ def register_effect(kind: KindT) -> KindT:
     """Add your own effect to the vocabulary; also as a decorator.
 
     Args:
-        kind: a frozen dataclass derived from `Effect`. It replaces an earlier one of the same name.
+        kind: a frozen dataclass derived from `Effect`. It replaces an earlier class of the same name.
 
     Raises:
-        TunnelError: when it has a built-in name, no severity, or lacks what the vocabulary needs.
+        TunnelError: when it has the name of a built-in effect, no severity, or lacks what the vocabulary needs.
     """
     check_kind(kind)
     _registered[kind.name] = kind
@@ -204,7 +204,7 @@ def effect_class(name: str) -> type[Effect]:
     """The class of the effect with a given name.
 
     Args:
-        name: such as ``coulomb_friction``.
+        name: name such as ``coulomb_friction``.
 
     Raises:
         TunnelError: when there is no such effect; the message suggests the closest name.
@@ -220,10 +220,10 @@ def the_effect(capability: type) -> type[Effect]:
     """The only built-in effect of a type.
 
     Args:
-        capability: such as `tunnel_sim.effects.capabilities.MainsPickup`.
+        capability: type such as `tunnel_sim.effects.capabilities.MainsPickup`.
 
     Raises:
-        LookupError: when there is none, or more than one.
+        LookupError: when there is no such effect, or more than one.
     """
     found = [kind for kind in ALL_EFFECTS if issubclass(kind, capability)]
     if len(found) != 1:
@@ -235,8 +235,8 @@ def effect_from(name: str, parameters: Mapping[str, float]) -> Effect:
     """An effect by name.
 
     Args:
-        name: such as ``coulomb_friction``.
-        parameters: by name, in their units; the others take their defaults.
+        name: name such as ``coulomb_friction``.
+        parameters: parameters by name, in their units; the others take their defaults.
 
     Raises:
         TunnelError: when a name is unknown or a value out of range.

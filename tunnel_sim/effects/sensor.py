@@ -59,7 +59,7 @@ class SensorNonlinearity(ReadingEffect):
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
-        """First a cubic error, then a mostly quadratic one."""
+        """First a cubic error, then a mostly quadratic error."""
         scale = {info.name: info.scale for info in cls.parameters()}
         mostly_square = {"coefficient": 0.01 * scale["coefficient"], "quadratic": scale["quadratic"]}
         return [*super().trials(campaign), Trial(mostly_square, "quadratic")]
@@ -106,7 +106,7 @@ class SensorHysteresis(ReadingEffect):
     )  # fmt: skip
 
     def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
-        """Follow when pushed; the release has just pushed the reading outward."""
+        """Follow when pushed; the release has just pushed the reading outwards."""
         del time_s, stated, drawn
         if self.is_null:
             return angle
@@ -144,7 +144,7 @@ class SensorDrift(ReadingEffect):
         return angle + self.drift * ramp(time_s / stated.duration, self.settling)
 
 
-_FAR = 2.0  # rad: the other limit, where only one side clips
+_FAR = 2.0  # rad: the other limit, if only one side clips
 
 
 @dataclass(frozen=True)
@@ -220,7 +220,7 @@ class SensorQuantisation(CoarseSteps):
     step: float = parameter("q", "rad", "true step of the reading", scale=0.002, lower=0.0, upper=1.0)
 
     def on_sensor(self, sensor: SensorModel) -> SensorModel:
-        """Use the true step where it is coarser than the stated one."""
+        """Use the true step if it is coarser than the stated one."""
         return dataclasses.replace(sensor, resolution=max(self.step, sensor.resolution))
 
 
@@ -259,11 +259,11 @@ class DroppedSamples(Clock):
 
     @classmethod
     def sought(cls, residuals: Residuals) -> Iterable[Sought | None]:
-        """Jumps of the reading alone, and of the input too."""
+        """Jumps of the reading alone, or of the input as well."""
         return (residuals.skips(with_input=False), residuals.skips(with_input=True))
 
     def draw(self, stated: RunSettings, rng: np.random.Generator) -> Drawn:
-        """The instant, as a share of the run, well inside it."""
+        """The instant, as a share of the run, well inside the run."""
         del stated
         return float(rng.uniform(0.1, 0.9))
 
@@ -304,7 +304,7 @@ def _lost(time_s: Array, lost_time: float, instants: Sequence[float]) -> Array:
 
 @lru_cache(maxsize=64)
 def _after_losses(times: Same, delay: float, lost_time: float, instants: tuple[float, ...]) -> Array:
-    """The true times of samples, s: one object for equal losses, whose lines and responses are computed once."""
+    """The true times of samples, s: one object for equal losses, so that lines and responses are computed once."""
     return read_only(times.array + _lost(times.array + delay, lost_time, instants))
 
 
@@ -342,10 +342,14 @@ class MainsHum(MainsPickup):
         return angle + self.amplitude * np.sin(2.0 * np.pi * self.frequency * time_s + phase)
 
 
-_LEAST_DAMPING = 1e-4  # of a structure: judgement; a line that does not decay is not a mode
+_LEAST_DAMPING = (
+    1e-4  # least damping ratio of a structure: judgement; a line that does not decay is not a mode
+)
 _DECAYS = 1.01  # a fit that ends at the least damping has found a driven line
-_LEAST_CYCLES = 3.0  # within its record and within its decay: fewer do not show an oscillation; judgement
-_SLOWEST = 0.1  # of the motion's frequency: judgement; anything slower is a drift in a record of ten cycles
+# cycles within the record and within the decay: fewer do not show an oscillation; judgement
+_LEAST_CYCLES = 3.0
+# share of the motion's frequency: judgement; anything slower is a drift in a record of ten cycles
+_SLOWEST = 0.1
 _LEAST_SPRING = 1e-9  # N m/rad: a fit may try zero
 
 
@@ -373,7 +377,7 @@ class SecondMode(SecondOscillation):
         "stiffness",
         "damping",
         "forcing",
-    )  # it beats with the motion, whose phase and amplitude change
+    )  # it beats with the motion, so that phase and amplitude change
     tries = 2
     ahead_of_sensor = True
 
@@ -401,9 +405,9 @@ class SecondMode(SecondOscillation):
         return (residuals.ringing(), residuals.excited())
 
     def plausible(self, omega: float, duration: float) -> bool:
-        """Whether it is a separate oscillation, of three cycles in the record.
+        """Whether the oscillation is separate from the motion, with three cycles in the record.
 
-        It decays, but not within three cycles, beats with the motion, and is not as slow as a drift.
+        It must decay, but not within three cycles; beat with the motion; and not be as slow as a drift.
         """
         decays = self.damping_ratio > _DECAYS * _LEAST_DAMPING
         lasts = 2.0 * np.pi * self.damping_ratio * _LEAST_CYCLES < 1.0
@@ -446,8 +450,8 @@ class SecondMode(SecondOscillation):
 class InputDelay(InputClock):
     """An input that acts later than its time stamps.
 
-    Both holds and any delay are exact in a single motion. In a fit, a step that contains a kink keeps the impulse
-    and the first moment of the input. Beyond its samples the input keeps its first and its last value.
+    Both holds and any delay are exact in a single motion. In a fit, a step that contains a kink keeps the
+    impulse and the first moment of the input. Beyond its samples the input keeps its first and its last value.
     """
 
     name = "input_delay"

@@ -1,4 +1,4 @@
-"""The traits of an effect: its parameters, what it is, and how a fit finds it."""
+"""The traits of an effect: its parameters, its description, and how a fit finds it."""
 
 from __future__ import annotations
 
@@ -30,31 +30,32 @@ Text: TypeAlias = Callable[[float, float | None, str], str]
 class Traits:
     """The properties that an effect states; the first parameter is the severity.
 
-    Every effect states ``example``, values of its parameters in their order at which it is visible. A built-in one
-    also states ``place``, its number in the vocabulary (random draws depend on the order, so a new effect takes the
-    next number).
+    Every effect states ``example``, parameter values in order with which the effect is visible. A built-in
+    effect also states ``place``, its number in the vocabulary (random draws depend on the order, so a new
+    effect takes the next number).
 
     Traits, with defaults that an effect overrides:
 
-    - ``law_terms``: the moment law's parameters for the effect's own, in their order; empty: none.
+    - ``law_terms``: the parameters of the moment law that correspond to the effect's, in their order; empty:
+      none.
     - ``autonomous``: whether its moment and its reading depend on angle and rate alone.
     - ``fitted``: whether a fit of the deterministic motion can find it; else records or spectra show it.
     - ``on_spring``: whether its moment is proportional to the spring's stiffness.
     - ``driven``: whether it acts on driven runs only.
     - ``by_angle_in_room``: whether its moment depends on the body's angle in the room, or on a second inertia:
       neither is included where a base turns with a known acceleration.
-    - ``motion``: the only one that it acts on, in whose units the campaign's own sizes state it; empty: any.
-    - ``jumps``: whether its law jumps or has a kink, as dry friction where the rate changes its sign: an
+    - ``motion``: the only motion that it acts on, at the campaign's own scale and in its units; empty: any motion.
+    - ``jumps``: whether its law jumps or has a kink, as dry friction has where the rate changes its sign: an
       integration step across it is less accurate, and the tests allow for this.
-    - ``turns``: the parameter that changes its sign if angles are counted from half a turn away; empty: none.
-    - ``tries``: how many starting points of a fit are worth trying.
+    - ``turns``: the parameter that flips sign when the angle origin shifts by π; empty: none.
+    - ``tries``: number of starting points of a fit that are worth trying.
     - ``size``: its size in plain words, with the names of parameters in braces; empty: they are listed.
     - ``advice``: the remedy, a clause without its full stop; empty for a user's effect. The name of
       a parameter in braces stands for its value.
-    - ``advice_for_joint``: the remedy for the joint of a machine, where it differs.
+    - ``advice_for_joint``: the remedy for the joint of a machine, if it differs.
     - ``caveat``: how to read the coefficients that are reported with it.
-    - ``undetected``: how to read them where it is not named, with ``{size}`` and ``{changes}`` at its upper
-      limit; a clause without its full stop.
+    - ``undetected``: how to read the coefficients if it is not named, with ``{size}`` and ``{changes}`` at its
+      upper limit; a clause without its full stop.
     """
 
     name: ClassVar[str]
@@ -112,7 +113,7 @@ class Traits:
 
     @classmethod
     def shown_forms(cls, *, load_varies: bool) -> tuple[tuple[str, ...], ...]:
-        """The general forms that runs can show.
+        """The general forms that the runs can show.
 
         Args:
             load_varies: whether the moment that the joint carries varies in the runs.
@@ -122,7 +123,7 @@ class Traits:
 
     @classmethod
     def acts(cls, *, wind_on: bool) -> bool:
-        """Whether it acts in a run with the wind on or off."""
+        """Whether the effect acts in a run with the wind on or off."""
         return wind_on or cls.condition == "always"
 
     @classmethod
@@ -147,7 +148,7 @@ class Traits:
 
     @classmethod
     def per_run_parameters(cls, instants: int) -> tuple[str, ...]:
-        """Names of the effect's unknowns of every run, for an effect that has some.
+        """Names of the effect's unknowns in every run, for an effect that has any.
 
         Args:
             instants: number of instants in a run.
@@ -167,12 +168,12 @@ class Traits:
 
     @classmethod
     def phrase(cls, values: Mapping[str, float], stds: Mapping[str, float | None], text: Text) -> str:
-        """Its size in plain words, such as ``dry friction of 0.0040 N m``; empty without ``size``.
+        """The effect's size in plain words, such as ``dry friction of 0.0040 N m``; empty without ``size``.
 
         Args:
-            values: of its parameters, in their units.
-            stds: standard deviations of these, in the same units; None where not known.
-            text: writes a value with its standard deviation and its unit.
+            values: values of its parameters, in their units.
+            stds: standard deviations of the values, in the same units; None where not known.
+            text: function that writes a value with its standard deviation and its unit.
         """
         said = cls.size
         for info in cls.parameters():
@@ -189,7 +190,7 @@ class Traits:
             campaign: circumstances on which the values depend.
 
         Returns:
-            Starting values, the most promising first; empty where such a campaign cannot show the effect.
+            Starting values, the most promising first; empty if such a campaign cannot show the effect.
         """
         severity = cls.parameters()[0]
         return (Trial({severity.name: severity.scale * moment_scale(severity, campaign)}, severity.name),)
@@ -201,9 +202,9 @@ class Traits:
         """Stiffness and damping of a rigid body with the same small swings as the body with the effect.
 
         Args:
-            stiffness: without it, per unit inertia, 1/s².
-            damping: without it, per unit inertia, 1/s.
-            values: its parameters by name, per unit inertia.
+            stiffness: stiffness without the effect, per unit inertia, 1/s².
+            damping: damping without the effect, per unit inertia, 1/s.
+            values: the effect's parameters by name, per unit inertia.
         """
         del values
         return stiffness, damping
@@ -213,10 +214,10 @@ class Traits:
 
         Args:
             omega: angular frequency of the motion, rad/s.
-            duration: of the record, s.
+            duration: duration of the record, s.
 
         Returns:
-            False where its parameters make it part of the motion itself.
+            False if its parameters make it part of the motion itself.
         """
         del omega, duration
         return True
@@ -225,8 +226,8 @@ class Traits:
         """Other values of its parameters with the same effect on the slow motion.
 
         Returns:
-            Values, with the one that linear theory may scale; χ² may have another minimum near any of them. Empty
-            if there is only one minimum.
+            Values, including the parameter that linear theory may scale; χ² may have another minimum near any
+            of them. Empty if there is only one minimum.
         """
         return ()
 

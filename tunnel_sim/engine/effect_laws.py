@@ -1,4 +1,4 @@
-"""Laws that every effect obeys, whatever it is: the conformance tests and ``tunnel effects check`` use them."""
+"""Laws that every effect obeys; the conformance tests and ``tunnel effects check`` use them."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from tunnel_sim.vocabulary.plan import (
 from tunnel_sim.vocabulary.record import Array, Record
 
 INTEGRATION_TOLERANCE = 2e-5
-"""Greatest error of the integration, rad: a twenty-fifth of the sensor's noise, as decision 0006 states it."""
+"""Greatest error of the integration, rad: a twenty-fifth of the sensor's noise, as stated in decision 0006."""
 
 SENSOR = SensorModel(zero=0.003)
 WIND_ON = RunSettings(
@@ -54,13 +54,13 @@ class Verdict:
 
 
 def example(kind: type[Effect], **changed: float) -> Effect:
-    """The effect with the values at which its class states that it is visible, some of them changed."""
+    """The effect with the values at which it is visible, as stated by its class, with some of them changed."""
     values = dict(zip((info.name for info in kind.parameters()), kind.example, strict=False))
     return make_effect(kind, values | changed)
 
 
 def stated(kind: type[Effect], run: RunSettings = WIND_ON) -> RunSettings:
-    """The run with the input that an effect on driven runs needs."""
+    """The run, with an input if the effect acts on driven runs only."""
     return replace(run, drive=DRIVE) if kind.driven else run
 
 
@@ -93,7 +93,7 @@ def _same(one: Record, other: Record) -> bool:
 
 
 def null(kind: type[Effect]) -> str:
-    """At zero severity the record is bit-identical to one without the effect."""
+    """At zero severity the record is bit-identical to a record without the effect."""
     elsewhere = example(kind, **{kind.parameters()[0].name: 0.0})
     bare = _bare(windy=True, driven=kind.driven)
     changed = [not _same(_record((effect,), stated(kind)), bare) for effect in (kind(), elsewhere)]
@@ -101,7 +101,7 @@ def null(kind: type[Effect]) -> str:
 
 
 def seen(kind: type[Effect]) -> str:
-    """Beyond its null it changes the record."""
+    """Beyond its null the effect changes the record."""
     effect = example(kind)
     if effect.is_null:
         return "its example has a severity of 0"
@@ -110,7 +110,7 @@ def seen(kind: type[Effect]) -> str:
 
 
 def condition(kind: type[Effect]) -> str:
-    """It acts with the wind off if its condition is always, and only then."""
+    """The effect acts with the wind off if its condition is always, and only then."""
     unchanged = _same(
         _record((example(kind),), stated(kind, WIND_OFF)), _bare(windy=False, driven=kind.driven)
     )
@@ -120,13 +120,13 @@ def condition(kind: type[Effect]) -> str:
 
 
 def free(kind: type[Effect]) -> str:
-    """It leaves a free decay bit-identical if it acts on driven runs only."""
+    """The effect leaves a free decay bit-identical if it acts on driven runs only."""
     acts = kind.driven and not _same(_record((example(kind),), WIND_ON), _bare(windy=True, driven=False))
     return "it acts on a free decay" if acts else ""
 
 
 def round_trip(kind: type[Effect]) -> str:
-    """Written to JSON and read back by name, it is the same."""
+    """An effect written to JSON and read back by name is unchanged."""
     for effect in (example(kind), kind()):
         document = json.loads(json.dumps(effect.to_json_dict(), allow_nan=False))
         if document.get("name") != kind.name or make_effect(kind, document.get("parameters", {})) != effect:
@@ -135,7 +135,7 @@ def round_trip(kind: type[Effect]) -> str:
 
 
 def bounds(kind: type[Effect]) -> str:
-    """Values beyond the bounds stated are refused."""
+    """Values beyond the stated bounds are refused."""
     for info in kind.parameters():
         for bound, outward in ((info.lower, -math.inf), (info.upper, math.inf)):
             try:
@@ -180,7 +180,7 @@ def integration(kind: type[Effect]) -> str:
 
 
 def oracle(kind: type[Effect]) -> str:
-    """It moves the rig like the moment that its class states independently."""
+    """The effect moves the rig as its independently stated moment does."""
     worst = 0.0
     for run in (WIND_ON, WIND_OFF):
         moment = example(kind).moment_oracle(run)
@@ -193,7 +193,7 @@ def oracle(kind: type[Effect]) -> str:
 
 
 def _by_scipy(run: RunSettings, moment: Callable[[float, float, float], float], time_s: Array) -> Array:
-    from scipy.integrate import solve_ivp  # only here: slow to load
+    from scipy.integrate import solve_ivp  # imported here because it is slow to load
 
     flow = load_rig().body.flow(run.air_density, run.wind_speed)
     stiffness = aerodynamic_stiffness(run.derivatives.cn_beta, **flow)
@@ -220,7 +220,7 @@ LAWS: Mapping[str, Callable[[type[Effect]], str]] = {
     "integration": integration,
     "oracle": oracle,
 }
-"""Every law by name; a function returns the fault, or nothing where the law is obeyed."""
+"""Every law by name; a function returns the fault, or nothing if the effect obeys the law."""
 
 
 def check(kind: type[Effect]) -> list[Verdict]:

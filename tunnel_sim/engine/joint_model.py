@@ -1,4 +1,4 @@
-"""A user's model with one moving joint: the law of that joint, and the actuator that drives it."""
+"""A user's model with one moving joint: the law of this joint, and the actuator that drives it."""
 
 from __future__ import annotations
 
@@ -21,11 +21,13 @@ from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, sh
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import FREE_PARAMETERS, Actuator, JointLaw, Term
 
-_GRID = 361  # positions at which the moment is tabulated
-_EXACT = 1e-8  # of the greatest moment: residual allowed to the terms of the law, the engine's own rounding
-_PRESENT = 1e-9  # of the greatest moment: a smaller term is rounding
-_TURN = 2.0 * math.pi  # rad/s, for an unrestrained joint: moments are judged against its inertial moments
-_RATES = np.array([-3.0, -1.0, -0.3, 0.3, 1.0, 3.0])  # times the rate of the motion
+_GRID = 361  # number of positions at which the moment is tabulated
+# share of the greatest moment: allowed residual of the law's terms, due to the engine's rounding
+_EXACT = 1e-8
+_PRESENT = 1e-9  # share of the greatest moment: a smaller term is rounding
+# rad/s, for an unrestrained joint: the reference for its moments is the inertial moment
+_TURN = 2.0 * math.pi
+_RATES = np.array([-3.0, -1.0, -0.3, 0.3, 1.0, 3.0])  # multiples of the motion's rate
 _MOMENTS = (
     ("b", "N m/rad"),
     ("sin(b)-b", "N m"),
@@ -43,9 +45,9 @@ class Recorded:
 
     Args:
         reach: greatest displacement from rest, or for driven runs from the middle, rad (m for a slide).
-        middle: of driven runs, read as positions of the joint, rad; None: all runs are free decays.
+        middle: middle of driven runs, in positions of the joint, rad; None: all runs are free decays.
         controlled: whether the input of a run is the control of an actuator.
-        actuator: the name of that actuator; None: the joint has only one.
+        actuator: the name of this actuator; None: the joint has only one.
     """
 
     reach: float
@@ -56,7 +58,7 @@ class Recorded:
 
 @dataclass(frozen=True, eq=False)
 class JointModel:
-    """A model whose only moving joint is the recorded one."""
+    """A model in which only the recorded joint moves."""
 
     path: Path
     joint: str
@@ -82,7 +84,7 @@ def read_joint_model(
 
     Args:
         free: which of `FREE_PARAMETERS` are fitted; None: inertia, damping and rest position, and the stiffness
-            where the joint has a spring, beside gravity or in driven runs.
+            if the joint has a spring, together with gravity or in driven runs.
     """
     files = read_model_files(path, asset_dir)
     names, contents = files.to_parts()
@@ -185,7 +187,7 @@ class _Engine:
         """Moment of gravity, springs, dampers and actuators, without constraints, N m.
 
         Args:
-            control: place among the model's controls, and value; the others are zero.
+            control: index of a control in the model, and its value; the others are zero.
         """
         self.data.qpos[0], self.data.qvel[0] = position, rate
         if self.model.nu:
@@ -206,9 +208,9 @@ class _Engine:
 
 
 def _actuator(model: mujoco.MjModel, recorded: Recorded) -> Actuator | None:
-    """The actuator whose control drives the runs, its moment measured; None where no control does.
+    """The actuator with the control that drives the runs, and its measured moment; None if no control drives them.
 
-    The limits of its force are removed from the model, since they are checked along the records.
+    The limits of its force are removed from the model, because they are checked along the records.
     """
     if not recorded.controlled and recorded.actuator is None:
         return None
@@ -259,7 +261,7 @@ def _actuator(model: mujoco.MjModel, recorded: Recorded) -> Actuator | None:
 
 def _rest(engine: _Engine, grid: Array, moments: Array) -> float:
     """The stable rest position closest to the model's own configuration, rad."""
-    from scipy.optimize import brentq  # only here: slow to load
+    from scipy.optimize import brentq  # imported here because it is slow to load
 
     moments = np.where(np.abs(moments) < 1e-12 * np.max(np.abs(moments)), 0.0, moments)
     falls = np.flatnonzero((moments[:-1] >= 0.0) & (moments[1:] < 0.0))
@@ -294,7 +296,8 @@ def _law(model: mujoco.MjModel, recorded: Recorded, *, slide: bool) -> JointLaw:
         )
     stiffness = terms.pop("b", 0.0)
     own, centre = int(model.dof_frictionloss[0] > 0.0), rest if middle is None else middle
-    for x in np.linspace(centre - reach, centre + reach, _GRID // 4):  # nothing else may act within the reach
+    # no other moment may act within the reach
+    for x in np.linspace(centre - reach, centre + reach, _GRID // 4):
         engine.moment(float(x))
         if engine.data.ncon:
             pair = [model.geom(g).name or f"geom {g}" for g in engine.data.contact.geom[0]]
@@ -340,10 +343,10 @@ def _law(model: mujoco.MjModel, recorded: Recorded, *, slide: bool) -> JointLaw:
 def _fitted(
     forms: Sequence[tuple[str, str]], moving: dict[str, Array], wanted: Array, scale: float
 ) -> dict[str, float] | None:
-    """Coefficients by expression, without mere rounding; None where the forms do not fit the moment.
+    """Coefficients by expression, without terms that are mere rounding; None if the forms do not fit the moment.
 
-    Rounding is judged against the moment ``scale`` (N m). The linear term includes the slope of the sine at rest,
-    so that it is the whole slope.
+    Rounding is judged against the moment ``scale`` (N m). The linear term includes the slope of the sine at
+    rest, so that it is the whole slope.
     """
     from tunnel_sim.physics.expression import parse
 

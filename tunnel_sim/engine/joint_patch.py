@@ -23,7 +23,8 @@ from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, shown
 from tunnel_sim.vocabulary.rig import WrittenAttribute
 
-_SPARE = 2  # samples of a delayed control beyond the delay: both neighbours of a time between samples
+# number of samples of a delayed control beyond the delay: both neighbours of a time between samples
+_SPARE = 2
 _SLOW = 1e-9  # rad/s: slower than any creep
 
 
@@ -32,9 +33,9 @@ class Start:
     """The start of a run.
 
     Args:
-        time: since the start of the record, s.
+        time: time since the start of the record, s.
         angle, rate: displacement from rest, rad, and its rate, rad/s.
-        drive: its drive from then on; None: a free decay.
+        drive: drive of the run from then on; None: a free decay.
     """
 
     run: str
@@ -50,8 +51,8 @@ class Into:
 
     Args:
         before: the given model, compiled.
-        inertia: about the joint, as written so far, kg m².
-        weight: share of the weight of the bodies that remains, a fraction.
+        inertia: inertia about the joint, as written so far, kg m².
+        weight: remaining share of the weight of the bodies, a fraction.
         states: number of written elements with a state.
     """
 
@@ -72,16 +73,16 @@ class Element(Protocol):
     """A part of a law that can be written into a model."""
 
     def write(self, into: Into) -> Into:
-        """Write it."""
+        """Write the element."""
 
     def begin(self, into: Into, key: mujoco.MjsKey, start: Start) -> None:
-        """Write its state at the start of a run into a key frame."""
+        """Begin the element's state at the start of a run in a key frame."""
 
 
 def patched(
     model: JointModel, elements: Sequence[Element], starts: Sequence[Start] = ()
 ) -> tuple[mujoco.MjSpec, tuple[WrittenAttribute, ...]]:
-    """The model with a law written into it, its runs' starts as keyframes, and the written attributes."""
+    """The model with a law written into it, the starts of its runs as keyframes, and the written attributes."""
     spec = model.spec()
     before = spec.compile()
     into = Into(model, spec, before, model.law.inertia)
@@ -112,7 +113,7 @@ def history_of(delay: float, timestep: float) -> int:
     """The samples of a delayed control that an actuator keeps.
 
     Args:
-        delay, timestep: s.
+        delay, timestep: delay and time step, s.
     """
     return math.ceil(delay / timestep) + _SPARE
 
@@ -122,7 +123,7 @@ def _refusals(model: JointModel) -> AbstractContextManager[None]:
 
 
 def patched_xml(spec: mujoco.MjSpec, model: JointModel, folder: Path) -> str:
-    """The MJCF of a model from `patched`, with paths of its meshes from ``folder``."""
+    """The MJCF of a model from `patched`; its meshes have paths from ``folder``."""
     for name in ("meshdir", "texturedir") if spec.meshes or spec.textures or spec.hfields else ():
         assets = model.path.parent.resolve() / getattr(spec.compiler, name)
         setattr(spec.compiler, name, os.path.relpath(assets, folder.resolve()))
@@ -137,7 +138,7 @@ def inertia_of_steps(model: mujoco.MjModel, damping: float) -> float:
     middle: this adds C h/2 to the inertia, or subtracts it.
 
     Args:
-        damping: of the joint, added to the model's, N m s/rad.
+        damping: damping of the joint, added to the model's, N m s/rad.
     """
     options, kinds = model.opt, mujoco.mjtIntegrator
     damping = float(model.dof_damping[0]) + damping
@@ -152,14 +153,14 @@ def inertia_of_steps(model: mujoco.MjModel, damping: float) -> float:
 
 
 def creep_rate(model: mujoco.MjModel, rest: float) -> float:
-    """The rate up to which ``frictionloss`` yields as a damper, computed by the engine at rest, rad/s.
+    """The rate up to which ``frictionloss`` acts as a damper, computed by the engine at rest, rad/s.
 
     Args:
-        model: its joint has a ``frictionloss``.
+        model: model with a ``frictionloss`` in its joint.
         rest: position of the joint at which no other moment acts, rad.
 
     Returns:
-        0 where another moment at the rest exceeds the friction, so that the engine shows no such rate.
+        0 if another moment at rest exceeds the friction, so that the engine shows no such rate.
     """
     data, forces = mujoco.MjData(model), []
     for rate in (0.0, _SLOW):
@@ -215,12 +216,13 @@ def simulate_joint(
     """Simulate one run of a patched model, by displacement from rest, with the model's own integrator and steps.
 
     In every step the input has its mean over the step. Higher-order integrators read a delayed control between
-    steps: they use its means around the steps' starts.
+    steps: they use the means around the steps' starts.
 
     Args:
         law_rest: the joint's position at rest, rad.
-        duration: s.
-        actuator: its control is the input; None: the input is a moment on the joint (``qfrc_applied``).
+        duration: duration, s.
+        actuator: the actuator with the input as its control; None: the input is a moment on the joint
+            (``qfrc_applied``).
     """
     steps = duration / model.opt.timestep
     remedy = "lengthen the model's timestep"

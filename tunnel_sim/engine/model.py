@@ -25,7 +25,7 @@ from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig, WorkingSection, davis_vertices
 
 BUILT_FOR = "4.0.0"
-"""The version of MuJoCo that the plugin is built against, as ``pyproject.toml`` requires."""
+"""The version of MuJoCo for which the plugin is built, as required by ``pyproject.toml``."""
 
 
 @functools.cache
@@ -33,7 +33,7 @@ def load_plugin() -> None:
     """Register the plugin with MuJoCo; a second call does nothing.
 
     Raises:
-        TunnelError: where another version of MuJoCo is installed than the plugin is built against.
+        TunnelError: when another version of MuJoCo is installed than the plugin is built for.
     """
     if mujoco.__version__ != BUILT_FOR:
         what = f"MuJoCo {mujoco.__version__} is installed, and the engine plugin was built for {BUILT_FOR}"
@@ -132,7 +132,7 @@ def frame_mesh(rig: Rig) -> Mesh:
     half, top = 0.14, z + rig.rod.length_above_ceiling
     for side in (-half, half - b):
         parts.append(box_mesh((-b / 2, side, z + _GLASS), (b / 2, side + b, top)))
-    parts.append(box_mesh((-b / 2, -y, z), (b / 2, y, z + b)))  # the beam across the ceiling below it
+    parts.append(box_mesh((-b / 2, -y, z), (b / 2, y, z + b)))  # the beam across the ceiling, below the frame
     return merged_mesh([*parts, box_mesh((-b, -half, top), (b, half, top + b / 2))])
 
 
@@ -149,7 +149,7 @@ def marks_mesh(rig: Rig) -> Mesh:
 
 
 _SERIES = ("wind_speed", "forcing", "ambient")
-_THINNEST = 1e-3  # least width over length: MuJoCo refuses the inertias of a body of zero width
+_THINNEST = 1e-3  # least ratio of width to length: MuJoCo refuses the inertias of a body of zero width
 _COMPILED: dict[tuple[object, ...], mujoco.MjModel] = {}  # by rig and layout; callers get copies only
 _MOST_COMPILED = 16
 _NATIVE = frozenset({"spring_stiffness", "mechanical_damping", "yaw_inertia"})  # attributes of joint and body
@@ -211,12 +211,12 @@ class Model:
 
 
 def build_model(rig: Rig, settings: RunSettings, *, drawn: bool = True) -> Model:
-    """Build the model of one run; compiling, the slowest part, is done once for all runs of a layout.
+    """Build the model of one run; compilation, the slowest part, is done once for all runs of a layout.
 
     Args:
         settings: spring, damper, inertia, air and every further term of the moment law.
-        drawn: with the shapes, lights and cameras. The motion is bit-identical without them, and a step takes four
-            fifths of the time.
+        drawn: whether to include shapes, lights and cameras. The motion is bit-identical without them, and a
+            step takes 80 % of the time.
 
     Raises:
         TunnelError: when MuJoCo or the plugin refuses the settings, or the steps are too long for them.
@@ -325,7 +325,7 @@ def numerics(rig: Rig, settings: RunSettings) -> dict[str, tuple[float, ...]]:
         return values
     drive = settings.drive.acting
     times, given, held, step = drive.time_s, drive.values, drive.held, settings.timestep
-    if not drive.at_steps(step):  # by its means over the steps, which is of second order
+    if not drive.at_steps(step):  # by its means over the steps, a method of second order
         given = drive.means(step * np.arange(round((times[-1] + max(drive.delay, 0.0)) / step) + 3))
         held = True
         times = step * np.arange(given.size, dtype=np.float64)

@@ -1,7 +1,7 @@
 """The files of a user's model, MJCF or URDF.
 
-They are found by the names in the text, and read before MuJoCo sees any of them. MuJoCo receives their content, so
-it opens no file, and the model is the same at every compilation.
+They are found by the names in the text, and read before MuJoCo sees any of them. MuJoCo receives their content,
+so it opens no file, and the model is the same at every compilation.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _DOCUMENT = re.compile(r"<(?:include|model)\s[^<>]*?\bfile" + _VALUE)
 _FILE = re.compile(r"\bfile(?:name|up|down|left|right|front|back)?" + _VALUE)
 _FOLDER = re.compile(r"\b(?:asset|mesh|texture)dir" + _VALUE)
 _STRIPPED = re.compile(r"<robot\b|\bstrippath\s*=\s*[\"']true")  # MuJoCo uses the last part of a URDF's names
-_MOST_FOLDERS = 20  # of a model: each name is looked for in each
+_MOST_FOLDERS = 20  # maximum number of folders of a model: each name is looked for in each
 _SMALLER = "leave out what the motion of the joint does not need"
 
 
@@ -64,7 +64,7 @@ def read_model_files(path: Path, asset_dir: Path | None = None) -> ModelFiles:
     """Read a model and the files that it names, from its own folder or a further one."""
     text, where = read_text(path, limits.MODEL_BYTES, missing="name an MJCF or URDF file"), shown(path)
     folders, stripped = {""}, False
-    names: dict[tuple[str, str], None] = {}  # of meshes and images, with their document's folder
+    names: dict[tuple[str, str], None] = {}  # folders of meshes and images, relative to their document
     documents: dict[str, bytes] = {}
     assets: dict[str, bytes] = {}
     unread = [("", text)]
@@ -128,14 +128,14 @@ def _content(model: Path, asset_dir: Path | None, place: str, limit: int) -> byt
 
 
 def _places(name: str, bases: Sequence[str], folders: Iterable[str]) -> list[str]:
-    """Possible places of a file, as MuJoCo would name it from the model's folder."""
+    """Possible paths of a file, given its name in MuJoCo relative to the model's folder."""
     name = name.replace("\\", "/")
     found = (posixpath.join(base, folder, name) for base in bases for folder in folders)
     return list(dict.fromkeys(posixpath.normpath(one) for one in found))
 
 
 def _values(pattern: re.Pattern[str], text: str) -> set[str]:
-    """The values of an attribute, without empty ones."""
+    """The values of an attribute, without empty values."""
     return {html.unescape(found[1][1:-1]) for found in pattern.finditer(text)} - {""}
 
 

@@ -37,7 +37,7 @@ def simulate_motion(model: Model, sample_rate: float) -> Motion:
     """Integrate one run with ``mj_step``.
 
     Args:
-        sample_rate: Hz.
+        sample_rate: sample rate, Hz.
     """
     samples, steps = sampling(model.settings, sample_rate)
     data = model.release_state()
@@ -64,7 +64,8 @@ def simulate(
     """Simulate one run as the sensor sees it.
 
     Args:
-        deviations: of the true wind speed, spring and mechanical damping from the settings, relative, by name.
+        deviations: relative deviations of the true wind speed, spring and mechanical damping from the settings,
+            by name.
 
     Raises:
         TunnelError: when the motion diverges or the settings are refused.
@@ -85,11 +86,11 @@ def simulate_motions(
     """Integrate many runs on a thread pool, bit-identical to `simulate_motion`.
 
     Args:
-        sample_rate: Hz.
+        sample_rate: sample rate, Hz.
         nthread: number of threads; 0 uses all processors.
     """
     runs: list[RunSettings] = []
-    groups: dict[tuple[object, ...], list[int]] = {}  # of runs that share a compiled model
+    groups: dict[tuple[object, ...], list[int]] = {}  # runs that share a compiled model, by layout
     for i, stated in enumerate(settings):
         try:
             run = follow_fastest(rig, stated)
@@ -154,7 +155,7 @@ class RunBatch:
     def advance(
         self, samples: int, first: Array, rows: Any = None, control: tuple[Array, Array] | None = None
     ) -> tuple[Array, Array]:
-        """Integrate runs over some samples.
+        """Integrate runs over a number of samples.
 
         Args:
             samples: number of samples after the first.
@@ -181,7 +182,7 @@ class RunBatch:
             samples * self._steps, applied, _CONTROL, ("qpos", "qvel"), ids=rows, out=out
         )
         if rows is None:
-            self._out = recorded  # the same buffers again
+            self._out = recorded  # reuse the same buffers
         angle, rate = (
             np.concatenate(
                 (now[:, None], recorded[name][:, self._steps - 1 :: self._steps, self._address]), axis=1
@@ -193,7 +194,7 @@ class RunBatch:
 
 @contextmanager
 def no_log() -> Iterator[None]:
-    """Suppress MuJoCo's warnings on the terminal and in a log file; the caller reports the same fault."""
+    """Suppress MuJoCo's warnings on the terminal and in a log file; the caller reports the fault itself."""
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda _: None)
     try:
@@ -204,7 +205,7 @@ def no_log() -> Iterator[None]:
 
 @contextmanager
 def no_timers() -> Iterator[None]:
-    """Stop MuJoCo's timers, which are not used here and take two fifths of a step."""
+    """Stop MuJoCo's timers: they are not used here and take 40 % of a step."""
     before = mujoco.get_mjcb_time()
     mujoco.set_mjcb_time(_no_clock())
     try:

@@ -43,7 +43,7 @@ def simulate_campaign(
 
     Returns:
         The campaign as a rig engineer would have measured it: it states the rig's nominal inertia, not the true
-        one, and contains no other trace of the truth.
+            inertia, and contains no other trace of the truth.
 
     Raises:
         TunnelError: when an effect is unknown or the motion of a run diverges.
@@ -98,7 +98,7 @@ def simulate_campaigns(
 
 @dataclass(frozen=True, eq=False)
 class _Drawn:
-    """The draws of a run: its generator, its effects, its own sensor, and its deviations from the plan."""
+    """The draws of a run: its generator, its effects, its sensor, and its deviations from the plan."""
 
     rng: np.random.Generator
     chain: EffectChain
@@ -106,7 +106,7 @@ class _Drawn:
 
     @property
     def between_runs(self) -> dict[str, float]:
-        """The deviations of the run by name, from the effects and the plan together: relative."""
+        """The relative deviations of the run by name, from the effects and the plan together."""
         found = dict(self.chain.deviations)
         for effect, drawn in zip(self.chain.effects, self.chain.drawn, strict=True):
             if isinstance(effect, BetweenRuns):
@@ -139,7 +139,7 @@ def _drawn(plan: CampaignPlan) -> list[_Drawn]:
 
 
 def stated_run(condition: Condition, record: Record) -> Run:
-    """A run as a campaign lists it, without the truth."""
+    """A run as listed in a campaign, without the truth."""
     return Run(
         id=condition.id,
         record=record,
@@ -161,8 +161,8 @@ def run_settings(
     """The stated physics of one run.
 
     Args:
-        sample_rate: of the input of a driven run, Hz; not used for a free decay.
-        mean_speed: of the campaign, m/s, as in `RunSettings`.
+        sample_rate: sample rate of the input of a driven run, Hz; not used for a free decay.
+        mean_speed: mean speed of the campaign, m/s, as in `RunSettings`.
     """
     given, moment = condition.drive, None
     if given is not None:
@@ -212,7 +212,8 @@ def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
         parameter = effect.chosen_spring()
         chosen = None if parameter is None else getattr(effect, parameter)
         if chosen is not None and not any(isclose(k, chosen, rel_tol=SPRING_TOLERANCE) for k in springs):
-            what = f"no run has a spring_stiffness of {chosen:g} N m/rad"  # so it would have no effect
+            # without a spring the effect would do nothing
+            what = f"no run has a spring_stiffness of {chosen:g} N m/rad"
             remedy = f"give one of {', '.join(f'{spring:g}' for spring in springs)}"
             raise TunnelError(what, where=where, remedy=remedy)
         if effect.driven and not drives:
@@ -264,7 +265,7 @@ def truth_document(plan: CampaignPlan) -> dict[str, Any]:
 
 
 def _scatter_truth(plan: CampaignPlan, scattering: Sequence[BetweenRuns]) -> dict[str, Any]:
-    """The widths of the scatter between the runs, and every run's own deviations; empty where the runs repeat."""
+    """The widths of the scatter between the runs, and every run's own deviations; empty if the runs repeat."""
     widths = plan.scatter.stated | {effect.scatters: effect.severity for effect in scattering}
     if not widths:
         return {}

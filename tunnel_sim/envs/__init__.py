@@ -1,11 +1,11 @@
-"""Gymnasium environments of the rig; ``import tunnel_sim.envs`` registers them, which ``gymnasium.make`` needs.
+"""Gymnasium environments of the rig; ``import tunnel_sim.envs`` registers them, which ``gymnasium.make`` requires.
 
 ``gymnasium.make("tunnel_sim.envs:tunnel_sim/FreeDecay-v0")`` imports this module by itself. Gymnasium does not
 read entry points since its version 1.0.
 
 ``tunnel_sim/FreeDecay-v0``: an episode is one run (docs/reference/envs/free-decay.md).
-``tunnel_sim/Campaign-v0``: an episode is a campaign and a step is a run. It needs identification and diagnosis, so
-its module is in ``tunnel_lab.envs``; it is referred to by name here and not imported.
+``tunnel_sim/Campaign-v0``: an episode is a campaign and a step is a run. It needs identification and diagnosis,
+so its module is in ``tunnel_lab.envs``; this package refers to it by name and does not import it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 
 
 def as_env_error(error: TunnelError, where: str) -> EnvError:
-    """Convert an error of a lower layer to an `EnvError`, concerning ``where`` unless it names a place itself."""
+    """Convert an error of a lower layer to an `EnvError` about ``where``, unless it names a place itself."""
     return EnvError(error.what, where=error.where or where, remedy=error.remedy)
 
 
@@ -39,7 +39,7 @@ def arguments_of(environment: type) -> tuple[str, ...]:
     return tuple(one.name for one in own if one.kind is not Parameter.VAR_KEYWORD)
 
 
-#: Entry points by identifier: of the environment, and of its native vector environment or None.
+#: Entry points by identifier: environment, and native vector environment or None.
 ENVIRONMENTS: dict[str, tuple[str, str | None]] = {
     "tunnel_sim/FreeDecay-v0": (
         "tunnel_sim.envs.free_decay:FreeDecayEnv",

@@ -1,4 +1,4 @@
-"""The operator's controls, and the integration of the runs: one with ``mj_step``, or many on ``mujoco.batch``.
+"""The operator's controls, and the integration of the runs: one run with ``mj_step``, or many on ``mujoco.batch``.
 
 Both give bit-identical results.
 """
@@ -29,7 +29,7 @@ class Operation:
 
     Args:
         wind_departure: mean difference from the stated speed in each sample interval, shape (runs, samples), m/s.
-        moment: on the rod's upper end, shape (runs,), N m.
+        moment: moment on the rod's upper end, shape (runs,), N m.
     """
 
     wind_departure: Array
@@ -40,7 +40,7 @@ class Models:
     """Models by layout, each compiled once.
 
     Args:
-        sample_rate: Hz.
+        sample_rate: sample rate, Hz.
     """
 
     def __init__(self, rig: Rig, sample_rate: float) -> None:
@@ -124,7 +124,7 @@ class ManyRuns:
         self._batches: dict[tuple[object, ...], RunBatch] = {}
         self._layout: list[tuple[object, ...]] = [()] * count
         self._members: dict[tuple[object, ...], NDArray[np.intp]] = {}
-        self._last = np.zeros((2, count))  # angle and rate at the last period's end
+        self._last = np.zeros((2, count))  # angle and rate at the end of the last period
 
     def start(self, row: int, settings: RunSettings) -> float:
         """Start a run at its release; result and arguments as in `OneRun.start`."""
@@ -182,7 +182,7 @@ class OperatorLog:
     Args:
         time_s: start of the period, shape (n,), s.
         set_point, wind_speed: set-point and, at the period's end, the speed, shape (n,), m/s.
-        moment: applied to the rod's upper end, shape (n,), N m.
+        moment: moment applied to the rod's upper end, shape (n,), N m.
     """
 
     time_s: Array
@@ -250,9 +250,9 @@ class WindAnswer:
     """The tunnel's first-order response to its set-point over one control period.
 
     Args:
-        period: s.
+        period: control period, s.
         samples: number of sample intervals in the period.
-        time_constant: s.
+        time_constant: time constant, s.
     """
 
     period: float

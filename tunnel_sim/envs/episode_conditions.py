@@ -33,7 +33,7 @@ from tunnel_sim.vocabulary.rig import Rig
 
 PRESETS = ("operator", "plain")
 LEAST_DEVIATION = 1e-6
-"""Least standard deviation of a reading, rad: below it the prior is lost in the rounding of the information."""
+"""Least standard deviation of a reading, rad: below it rounding of the information hides the prior."""
 WHERE = "FreeDecay-v0"
 """How errors name the environment."""
 _NUMBERS: Mapping[str, Number] = {
@@ -55,17 +55,18 @@ class FreeDecayConfig:
     Args:
         preset: ``operator``: the action sets the wind-speed set-point and an applied yaw moment; ``plain``: no
             control during a run.
-        duration: of a run, s; a whole number of control periods.
-        control_period: s; a whole number of sample intervals.
-        sample_rate: of the potentiometer, Hz.
+        duration: duration of a run, s; a whole number of control periods.
+        control_period: control period, s; a whole number of sample intervals.
+        sample_rate: sample rate of the potentiometer, Hz.
         noise_std: standard deviation of its noise, rad.
         resolution: step of its reading, rad; 0: no quantisation.
         wind_limit: greatest wind speed, m/s.
-        wind_time_constant: of the tunnel's first-order response to its set-point, s.
+        wind_time_constant: time constant of the tunnel's first-order response to its set-point, s.
         moment_limit: greatest moment that the operator can apply, N m.
         effect_probability: probability that an episode draws an effect, if its options do not name effects.
-        stop_penalty: loss of a run at the stop, besides its information, nats. By default as much as two
-            standard deviations smaller by a factor of e⁵ together, more than a run usually adds by control.
+        stop_penalty: penalty for a stopped run, in addition to the loss of its information, nats. The default
+            equals a reduction of two standard deviations by a factor of e⁵ together, more than a run usually
+            gains by control.
         prior: changes to `Prior` by name, in its units.
     """
 
@@ -139,7 +140,7 @@ def free_decay_config(arguments: Mapping[str, Any], beside: Iterable[str] = ()) 
     """The configuration of an environment from its keyword arguments.
 
     Args:
-        arguments: by name, in the units of `FreeDecayConfig`.
+        arguments: arguments by name, in the units of `FreeDecayConfig`.
         beside: names of the environment's other arguments, for the remedy.
     """
     known = [item.name for item in fields(FreeDecayConfig)]
@@ -157,8 +158,8 @@ def refuse_long(duration: float, rate: float, name: str, where: str) -> None:
     """Refuse a run of more samples than one record may have.
 
     Args:
-        duration: s.
-        rate: Hz.
+        duration: duration, s.
+        rate: sample rate, Hz.
     """
     if not duration * rate <= limits.RUN_SAMPLES:
         what = f"{name} = {duration:g} s at {rate:g} Hz is longer than a record can be"
@@ -175,10 +176,10 @@ WIND_SPEED = (10.0, 20.0)  # m/s
 RELEASE_ANGLE = (radians(5.0), radians(20.0))  # rad, to either side
 CN_BETA = (0.3, 0.6)  # 1/rad
 CN_R = (-0.2, -0.05)  # 1/rad
-INERTIA_SHARE = (0.95, 1.05)  # of the rig's Izz
-DAMPING_SHARE = (0.5, 1.5)  # of the rig's Cr
+INERTIA_SHARE = (0.95, 1.05)  # share of the rig's Izz
+DAMPING_SHARE = (0.5, 1.5)  # share of the rig's Cr
 SENSOR_ZERO = (-0.01, 0.01)  # rad
-SEVERITY_SHARE = (0.5, 2.0)  # of an effect's typical severity
+SEVERITY_SHARE = (0.5, 2.0)  # share of an effect's typical severity
 _UNITS = {
     "cn_beta": "1/rad",
     "cn_r": "1/rad",
@@ -191,7 +192,7 @@ _UNITS = {
     "sensor_zero": "rad",
 }
 """Keys of the numbers of a run."""
-STIFFNESS_MARGIN = 1.3  # least ratio of a drawn spring's stiffness to the greatest Ka
+STIFFNESS_MARGIN = 1.3  # minimum ratio of a drawn spring's stiffness to the greatest Ka
 
 
 @dataclass(frozen=True)
@@ -230,7 +231,7 @@ def plan_run(
     elif given.get("spring_stiffness") is not None:
         stiffness = _number(given, "spring_stiffness", (0.0, 0.0), None, least=1e-6)
     else:
-        # From springs whose stiffness exceeds Ka at any drawn speed, or else from all.
+        # from springs stiffer than Ka at any drawn speed, or else from all
         needed = STIFFNESS_MARGIN * aerodynamic_stiffness(
             CN_BETA[1], **rig.body.flow(rig.air.density, WIND_SPEED[1])
         )
@@ -268,7 +269,7 @@ def plan_run(
         one_run = CampaignPlan("episode", 0, truth, (condition,), sensor, tuple(settings))
         effects = plan_effects(one_run)
         for effect in effects:
-            # An episode reads the motion as it proceeds: none of it can be skipped.
+            # an episode reads the motion as it proceeds, so no part can be skipped
             if isinstance(effect, Clock) and not effect.is_null:
                 what = "an episode cannot drop samples"
                 remedy = "inject it with tunnel simulate, which makes whole records"
@@ -287,7 +288,7 @@ def _number(
     least: float = -1e6,
     most: float = 1e6,
 ) -> float:
-    """A given number, checked; if none is given, a drawn one, or the first bound without a generator."""
+    """A given number, checked; if none is given, a drawn number, or the first bound without a generator."""
     if given.get(name) is None:
         return float(rng.uniform(*bounds)) if rng is not None else bounds[0]
     return Number(least, most, unit=_UNITS[name]).checked(given[name], name, f"option {name}")
@@ -296,7 +297,7 @@ def _number(
 def _effects(
     stated: Any, config: FreeDecayConfig, condition: Condition, rng: np.random.Generator
 ) -> list[EffectSetting]:
-    """The stated effects, or one of half to twice its typical severity, drawn with the stated probability."""
+    """The stated effects, or an effect of half to twice its typical severity, drawn with the stated probability."""
     if stated is None:
         if not (config.effect_probability > 0.0 and rng.random() < config.effect_probability):
             return []

@@ -1,4 +1,4 @@
-"""Parallel episodes: readings, information, end, and the resulting campaign; a vector environment has many.
+"""Parallel episodes: readings, information, end, and the resulting campaign; a vector environment has many of them.
 
 Readings are bit-identical to `tunnel_sim.effects.chain.read_motion`: zero, noise and quantisation are
 vectorised, effects act run by run.
@@ -132,7 +132,7 @@ class Episodes:
         readings = self._readings.take(angle[:, :-1], self.step_count, ~self.ended)
         before = self.information.known
         rewards = self.information.advance(angle, rate, speeds.mean(axis=1), moment)
-        if wild.any():  # the run is lost: its sum of rewards is the penalty
+        if wild.any():  # the run is lost: the sum of its rewards is the penalty
             rewards = np.where(wild, -before - self._config.stop_penalty, rewards)
         self.step_count += 1
         observations = np.empty((self._count, self._config.samples_per_step + 2))
@@ -239,8 +239,8 @@ class RunningSensor:
         """The angle that the sensor measures in the next samples, before zero and noise are added.
 
         Args:
-            angle: of the rod's upper end, shape (n,), rad.
-            time_s: shape (n,), s; continues from the previous call.
+            angle: angle of the rod's upper end, shape (n,), rad.
+            time_s: times, shape (n,), s; they continue from the previous call.
         """
         if not self._remembers:
             return self.chain.angle(angle, time_s)
@@ -275,7 +275,7 @@ class Readings:
         """Readings (rad) of the control period before the release, shape (samples,), with independent noise.
 
         Args:
-            angle: of the held upper end of the rod, rad.
+            angle: angle of the held upper end of the rod, rad.
         """
         chain, sensor = self._of(row).chain, self._of(row).sensor
         time = np.arange(-self._samples, 0, dtype=np.float64) * self._interval
@@ -287,9 +287,9 @@ class Readings:
         """The next readings of all runs, shape (runs, samples), rad.
 
         Args:
-            angle: of the rod's upper end at the samples, shape (runs, samples), rad.
+            angle: angle of the rod's upper end at the samples, shape (runs, samples), rad.
             step: number of the control period, shape (runs,).
-            running: which runs are in progress, shape (runs,); the generators of the others are not used.
+            running: mask of the runs in progress, shape (runs,); the generators of the others are not used.
         """
         noise = np.zeros_like(angle)
         for row in np.flatnonzero(running).tolist():

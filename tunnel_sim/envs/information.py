@@ -44,7 +44,7 @@ UNKNOWNS = (
 """The order of rows and columns of the information matrix; the first five are eliminated."""
 
 REWARDED = UNKNOWNS[5:]
-"""The reward is the information about these, which is infinite from the start where they are known exactly."""
+"""The reward is the information about these; it would be infinite from the start if they were known exactly."""
 _PRIOR_UNITS = {
     "yaw_inertia": "shares of Izz",
     "mechanical_damping": "shares of Cr",
@@ -61,7 +61,7 @@ class Prior:
     """Prior knowledge of a run, as standard deviations; 0: known exactly, except for `REWARDED`.
 
     Args:
-        yaw_inertia, mechanical_damping: as a share of Izz and Cr; known from wind-off runs with the spring.
+        yaw_inertia, mechanical_damping: shares of Izz and Cr; known from wind-off runs with the spring.
         release_angle, sensor_zero: rad.
         release_rate: rad/s.
         cn_beta, cn_r: 1/rad, above 0.
@@ -96,17 +96,17 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class _Step:
-    """The linear maps of one step at one wind speed of each run.
+    """The linear maps of one step, at one wind speed for each run.
 
-    In each sample interval a sensitivity gets a kick to its value and one to its rate.
+    In each sample interval a sensitivity gets a kick to its value and a kick to its rate.
 
     Args:
-        sums: to the kicks per unit by the angle and by its rate, from angles and rates at both ends of an interval,
-            shape (runs, 4, 4).
+        sums: map from angles and rates at both ends of an interval to the kicks per unit by the angle and by
+            its rate, shape (runs, 4, 4).
         push: kicks by a unit moment, shape (runs, 2 samples).
-        shares: of the sensitivities in the three kinds of kicks, shape (runs, 3, DYNAMIC).
-        response: to the sensitivities at the samples and the end, and their rate at the end, from the sensitivities
-            at the start, their rates, and the kicks, shape (runs, samples + 2, 2 samples + 2).
+        shares: shares of the sensitivities in the three kinds of kicks, shape (runs, 3, DYNAMIC).
+        response: map from the sensitivities at the start, their rates, and the kicks to the sensitivities at
+            the samples and the end, and their rate at the end, shape (runs, samples + 2, 2 samples + 2).
     """
 
     sums: Array
@@ -122,7 +122,7 @@ class _Step:
         k = stiffness - air_stiffness * wind_speed**2
         count = len(wind_speed)
         at = np.concatenate(([0.5 * interval], interval * np.arange(samples + 1)))
-        # The last entry of every run is the zero of responses to later kicks.
+        # the last entry of every run is the zero for responses to later kicks
         solution = np.zeros((count, 4 * len(at) + 1))
         parts = solution[:, :-1].reshape(count, 4, len(at))
         parts[:, 0], parts[:, 1], parts[:, 2], parts[:, 3] = propagator(a[:, None], k[:, None], at)
@@ -178,15 +178,15 @@ class Information:
 
     Args:
         samples: number of samples in one step.
-        interval: between samples, s.
-        variance: of a reading, rad².
+        interval: interval between samples, s.
+        variance: variance of a reading, rad².
     """
 
     def __init__(self, count: int, samples: int, interval: float, variance: float, prior: Prior) -> None:
         self._samples, self._interval, self._variance, self._prior = samples, interval, variance, prior
         self._runs = np.ones((7, count))
         self._x = np.zeros((2, count, DYNAMIC))  # sensitivity of the angle, and its rate
-        self._speed = np.full(count, np.nan)  # for which the matrices of `_Step` are valid
+        self._speed = np.full(count, np.nan)  # wind speeds for which the matrices of `_Step` are valid
         self._step = _Step.of(np.zeros((7, count)), np.zeros(count), samples, interval)
         size = len(UNKNOWNS)
         self._scale = np.ones((count, size))  # the prior standard deviations are the units of the matrices
@@ -234,9 +234,7 @@ class Information:
             rate[:, :-1],
             rate[:, 1:],
         )
-        sums = np.matmul(
-            step.sums, drive
-        )  # of value and rate by the angle, then of value and rate by its rate
+        sums = np.matmul(step.sums, drive)  # kicks to value and rate by the angle, then by its rate
         kicks = np.empty((count, 2 * samples, 3))
         kicks[:, :, :2] = sums.reshape(count, 2, 2 * samples).transpose(0, 2, 1)
         kicks[:, :, 2] = step.push * moment[:, None]

@@ -25,7 +25,8 @@ from tunnel_sim.vocabulary.rig import Rig
 
 RENDER_MODES = ("human", "rgb_array")
 _FILM_QUALITY = (2048, 4)
-"""Quality of shadows and edges: a fifth of the time of a still picture, which looks the same at this size."""
+"""Quality of shadows and edges: it takes a fifth of the time of a still picture, and looks the same at this
+size."""
 
 _REMEDY = "install EGL or OSMesa (Debian and Ubuntu: libegl1 or libosmesa6), or set MUJOCO_GL"
 
@@ -34,7 +35,7 @@ class RigView:
     """Draws the rig.
 
     Args:
-        width, height: of a picture, pixels.
+        width, height: size of a picture, pixels.
         period: time between two frames in a window, s.
     """
 
@@ -86,13 +87,13 @@ class RigView:
                 if not _has_display():
                     remedy = "use render_mode='rgb_array'"
                     raise EnvError("there is no display", where="render_mode human", remedy=remedy)
-                from mujoco import viewer  # only here: it needs the libraries of a display
+                from mujoco import viewer  # imported here because it needs the libraries of a display
 
                 sides = {"show_left_ui": False, "show_right_ui": False}
                 self._window = viewer.launch_passive(self._model, self._data, **sides)
                 self._shown = time.monotonic()
             self._window.sync()
-            wait = self._period - (time.monotonic() - self._shown)  # real time
+            wait = self._period - (time.monotonic() - self._shown)  # wait, to show real time
             if wait > 0.0:
                 time.sleep(wait)
             self._shown = time.monotonic()

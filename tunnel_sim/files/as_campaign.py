@@ -1,4 +1,4 @@
-"""A campaign from whatever a user names: itself, its folder, or a file of a data logger."""
+"""A campaign from anything that a user names: the campaign itself, its folder, or a file of a data logger."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from tunnel_sim.vocabulary.errors import TunnelError, counted, one_line, shown
 
 
 def as_campaign(given: Campaign | Path | str) -> Campaign:
-    """A campaign, read if its folder, its ``campaign.toml`` or one file of a data logger is given.
+    """As is, or read from its folder, its ``campaign.toml`` or one file of a data logger.
 
     Raises:
-        TunnelError: for anything else, and where it cannot be read.
+        TunnelError: for any other argument, and if the campaign cannot be read.
     """
     if isinstance(given, Campaign):
         return given
@@ -29,7 +29,8 @@ def as_campaign(given: Campaign | Path | str) -> Campaign:
     refuse_records(path)
     if not path.is_file() or path.name == CAMPAIGN_FILE:
         return read_campaign(path)
-    from tunnel_sim.files.importing.records import read_records  # only here: a campaign needs none of it
+    # imported here because a campaign needs none of it
+    from tunnel_sim.files.importing.records import read_records
 
     return read_records([path]).campaign
 
@@ -42,7 +43,7 @@ def refuse_records(path: Path) -> None:
     """Refuse a folder of a data logger's files with the command that imports them; other paths pass.
 
     Raises:
-        TunnelError: with the command, and with what it asks for beside the options in the command.
+        TunnelError: with the command, and with further questions, as options in the command.
     """
     if not path.is_dir() or any((one / CAMPAIGN_FILE).exists() for one in (path, path.resolve().parent)):
         return
@@ -67,6 +68,6 @@ def refuse_records(path: Path) -> None:
 
 
 def _may_be_record(path: Path) -> bool:
-    """Whether the import reads files of this ending."""
+    """Whether the import reads files with this ending."""
     ending = path.suffix.lower()
     return ending in _TEXT or reader_place(ending) is not None

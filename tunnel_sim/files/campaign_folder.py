@@ -125,10 +125,10 @@ def parse_document(document: dict[str, Any], path: Path) -> CampaignDocument:
 
 
 def _freedom_of(document: Mapping[str, Any], path: Path) -> Freedom:
-    """The freedom that a document states; an angle where the statement is no text, which is refused later.
+    """The freedom that a document states; an angle if the statement is not a text, which is refused later.
 
     Raises:
-        TunnelError: for another text than the name of a freedom: every key depends on it.
+        TunnelError: for any text other than the name of a freedom: every key depends on it.
     """
     sensor = document.get("sensor")
     stated = sensor.get("motion") if isinstance(sensor, Mapping) else None
@@ -145,7 +145,7 @@ def _freedom_of(document: Mapping[str, Any], path: Path) -> Freedom:
 
 
 def _as_angle(document: Mapping[str, Any], freedom: Freedom, path: Path) -> dict[str, Any]:
-    """A document under the keys of an angle; what is not a table is left to the validation."""
+    """A document under the keys of an angle; values that are not tables are left to the validation."""
     found, rig, runs = dict(document), document.get("rig"), document.get("runs")
     if isinstance(rig, Mapping):
         found["rig"] = freedom.as_angle(rig, f"{shown(path)}, [rig]")
@@ -194,7 +194,7 @@ def run_place(path: Path, run_id: str) -> str:
     return f"{shown(path)}, run '{run_id}'"
 
 
-_NOT_STATED = ("id", "record", "drive", "clock_s")  # of a run, among its conditions
+_NOT_STATED = ("id", "record", "drive", "clock_s")  # keys of a run that are not conditions
 
 
 def campaign_document(campaign: Campaign, files: dict[str, str]) -> dict[str, Any]:
@@ -307,7 +307,7 @@ def read_campaign(folder: Path | str, progress: Callable[[int, int], None] | Non
 
 
 def _check_keys(run: RunTable, column: InputColumn, where: str) -> None:
-    """Refuse statements of a run on an input that its column does not have."""
+    """Refuse statements of a run on an input that its column does not take."""
     for key in ("drive_gain", "servo_kv"):
         value = getattr(run, key)
         if value is not None and key not in INPUTS[column].keys:
@@ -333,20 +333,20 @@ def write_campaign(
     """Write a campaign so that reading it gives the same numbers: completely, or not at all.
 
     Args:
-        campaign: must pass every check of the reader.
-        folder: the folder to create, with its parents where they are missing.
+        campaign: a campaign that passes every check of the reader.
+        folder: the folder to create, with missing parents.
         run_format: ``parquet`` or ``csv``.
         truth: the simulated truth, written as ``truth.json``; None: no such file.
         overwrite: whether an existing folder may be replaced; it must be empty or contain only a campaign.
-        text: makes the text of ``campaign.toml`` from its tables, for comments in it.
+        text: function that makes the text of ``campaign.toml`` from its tables, for comments in it.
         beside: further files of the folder, by name.
-        checked: whether every record has already passed `checked_record`, which is then not repeated.
+        checked: whether every record has already passed `checked_record`, which is then skipped.
 
     Raises:
-        TunnelError: the folder exists or may not be replaced; the campaign would not be readable; the disk
-            reports an error.
-        ValueError: ``truth`` contains NaN or an infinity.
-        TypeError: ``truth`` contains a value that JSON cannot represent.
+        TunnelError: when the folder exists or may not be replaced, the campaign would not be readable, or the
+            disk reports an error.
+        ValueError: when ``truth`` contains NaN or an infinity.
+        TypeError: when ``truth`` contains a value that JSON cannot represent.
     """
     folder = Path(folder)
     if run_format not in RUN_FORMATS:
@@ -354,7 +354,7 @@ def write_campaign(
         raise TunnelError(f"unknown run format '{run_format}'", where=shown(folder), remedy=remedy)
     clear_leftovers(folder.resolve().parent)  # restores a folder set aside by a killed command
     check_target(folder, overwrite=overwrite)
-    # Run files are named by id where all ids are safe file names, else by number.
+    # run files are named by id if all ids are safe file names, else by number
     ids = [run.id for run in campaign.runs]
     safe = all(re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.+-]{0,79}", name) for name in ids)
     named = safe and len({name.lower() for name in ids}) == len(ids)

@@ -27,14 +27,14 @@ def from_json_fields(read: Callable[[Mapping[str, Any]], Mapping[str, Any]]) -> 
 
 
 def _frozen(value: Any) -> Any:
-    """A value of JSON with tuples for its lists, as the strict check of a field expects beyond JSON itself."""
+    """A JSON value with tuples for its lists, as required by the strict check of a field."""
     if isinstance(value, Mapping):
         return {name: _frozen(one) for name, one in value.items()}
     return tuple(map(_frozen, value)) if isinstance(value, list | tuple) else value
 
 
 class _Unwritten:
-    """Mark of a field that no document has; it is None in a value that was read."""
+    """Mark of a field that no document has; it is None in a value read from a document."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.none_schema()
@@ -44,7 +44,7 @@ UNWRITTEN = _Unwritten()
 
 
 class _Numbers:
-    """Mark of an array that a document has as a list of numbers, or of rows; null stands for NaN."""
+    """Mark of an array that a document stores as a list of numbers, or of rows; null stands for NaN."""
 
     def __init__(self, *, rows: bool) -> None:
         self._rows = rows

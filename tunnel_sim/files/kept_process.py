@@ -1,6 +1,6 @@
 """Reading in a process with limits, which is kept for the next file.
 
-A fork of a process reads there too: Polars works in the new process, and would wait for ever in the fork.
+A fork of a process reads there, too: Polars works in the new process, and would wait for ever in the fork.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _kept: list[Sandbox] = []
 def read_apart(
     work: Work, given: dict[str, Any], content: bytes, where: str
 ) -> tuple[dict[str, Any], Sequence[bytes]]:
-    """Do work on the content of a file in the kept process.
+    """Work on the content of a file in the kept process.
 
     Args:
         work: as for `Sandbox.do`; it gets the content as its only part.
@@ -45,7 +45,7 @@ def read_apart(
 
 
 def check_polars() -> None:
-    """Refuse work that Polars must do in this process and cannot."""
+    """Refuse work that needs Polars if it cannot run in this process."""
     if not polars_works():
         what = "this process is a fork of one that had loaded Polars, and Polars would wait for ever"
         remedy = "start processes by multiprocessing.get_context('spawn'), or do this in the first process"

@@ -168,8 +168,8 @@ def check_size(runs: int, duration: float, sample_rate: float, where: str) -> No
     """Refuse a campaign that is too large to simulate or to read again, before it is expanded.
 
     Args:
-        duration: of each run, s.
-        sample_rate: Hz.
+        duration: duration of each run, s.
+        sample_rate: sample rate, Hz.
     """
     check_count(runs, limits.CAMPAIGN_RUNS, "runs", where, "shorten a list, or make several campaigns")
     # Even the shortest run has two samples.
@@ -213,8 +213,8 @@ def load_plan(path: Path | str, *, rig: Rig | None = None) -> CampaignPlan:
             state; None: the packaged rig.
 
     Returns:
-        The plan: runs in the order springs, stiffnesses, then wind speeds, release angles, amplitudes of the drive
-        and repeats.
+        The plan: runs in the order springs, stiffnesses, then wind speeds, release angles, amplitudes of the
+            drive and repeats.
 
     Raises:
         TunnelError: for the first fault, in one line that names file, key and remedy.
@@ -224,7 +224,7 @@ def load_plan(path: Path | str, *, rig: Rig | None = None) -> CampaignPlan:
 
 
 def plan_from(document: PlanDocument, rig: Rig, where: str, folder: Path = Path()) -> CampaignPlan:
-    """The plan from a validated campaign description; a file for the drive is sought in the folder."""
+    """The plan from a validated campaign description; the folder is searched for a file for the drive."""
     table, time, numbers = document.drive, np.arange(document.samples) / document.sample_rate, count()
     given = None
     if table is not None and table.file is not None:
@@ -287,7 +287,7 @@ def paper_plan() -> CampaignPlan:
 
 def _short(value: float) -> str:
     """The shortest text that represents a number uniquely: ``15``, ``16.12``."""
-    return repr(value + 0.0).removesuffix(".0")  # + 0.0: minus zero is zero
+    return repr(value + 0.0).removesuffix(".0")  # + 0.0 turns minus zero into zero
 
 
 Formula = Annotated[OneLine, Field(max_length=limits.EXPRESSION_CHARACTERS)]

@@ -30,7 +30,7 @@ _NEEDS: dict[Kind, tuple[str, ...]] = {
     "square": ("frequency_hz",),
     "file": ("file",),
 }
-_BANDS = ("multisine", "random")  # kinds of lines within a band, which may be drawn
+_BANDS = ("multisine", "random")  # kinds with lines in a band, with phases that may be drawn
 _OF_AMPLITUDES = {kind.amplitudes: kind for kind in KINDS if kind.amplitudes}
 _OF_GAIN = tuple(kind for kind in _OF_AMPLITUDES.values() if kind.takes_gain)
 _OPTIONAL = ("frequency_hz", "frequencies_hz", "from_hz", "to_hz", "file", "seed", "gain", *_OF_AMPLITUDES)
@@ -70,7 +70,7 @@ class InputTable(StrictModel):
 
     @property
     def amplitudes(self) -> tuple[float | None, ...]:
-        """Peak of each driven run of a spring and a speed in the unit of the input; one None for a file."""
+        """Peak of each driven run of a spring and a speed, in the unit of the input; a single None for a file."""
         if self.kind == "file":
             return (None,)
         return tuple(value for name in _OF_AMPLITUDES for value in getattr(self, name))
@@ -85,8 +85,8 @@ def check_input_table(table: InputTable, samples: int, sample_rate: float, where
     """Refuse a drive with a missing key, with a key that its kind does not take, or too fast for the samples.
 
     Args:
-        samples: of a run (a count).
-        sample_rate: Hz.
+        samples: number of samples of a run.
+        sample_rate: sample rate, Hz.
     """
     given = [name for name in _OPTIONAL if getattr(table, name) not in (None, [])]
     needed = _NEEDS[table.kind]
@@ -150,7 +150,7 @@ def input_of_run(table: InputTable, amplitude: float, number: int, time_s: Times
 
     Args:
         amplitude: peak, in the unit of the input.
-        number: of the driven run in the plan from 0 on: drawn phases differ from run to run.
+        number: number of the driven run in the plan, from 0 on: drawn phases differ from run to run.
     """
     low, high = table.from_hz or 0.0, table.to_hz or 0.0
     rng = np.random.default_rng([table.seed or 0, number])
@@ -169,7 +169,7 @@ def input_of_run(table: InputTable, amplitude: float, number: int, time_s: Times
 
 
 def input_of_file(path: Path, time_s: Times, table: InputTable, where: str) -> Input:
-    """The input of a file at the times of the samples from 0 on, its first value at time 0."""
+    """The input of a file at the times of the samples from 0 on; time 0 is its first value."""
     given, column, values = read_input(path, where)
     hold = table.hold
     if not INPUTS[column].amplitudes:

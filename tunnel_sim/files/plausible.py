@@ -22,9 +22,11 @@ from tunnel_sim.vocabulary.quantities import Hertz, Rad, Readings, Times
 from tunnel_sim.vocabulary.record import Record, count_cycles
 
 KEEP = "state plausible = false under [sensor] to keep it"
-#: With fewer samples per cycle a fit hardly tells the motion from its alias above half the sample rate.
+#: With fewer samples per cycle a fit can hardly distinguish the motion from its alias above half the sample
+#: rate.
 LEAST_SAMPLES_PER_CYCLE = 4.0
-#: With fewer the peaks are only resolved to 5 %. A fit needs no more, so they are accepted with a remark.
+#: With fewer samples per cycle the peaks are only resolved to 5 %. A fit needs no more, so they are accepted
+#: with a remark.
 FEW_SAMPLES_PER_CYCLE = 10.0
 _LOOKS = "it looks like"
 _TWO_TURNS = 4.0 * np.pi
@@ -32,12 +34,13 @@ _TWO_TURNS = 4.0 * np.pi
 # differences are allowed: a run with times may have its own sample rate.
 _TIME_SLIPS = (1e-6, 1e-3, 1e3, 1e6)
 _SLIP_TOLERANCE = 0.1
-_JUMP = 50.0  # usual steps: a longer gap in a record without an oscillation is a jump of the clock
-_JOINED = 6  # samples on each side of a jump, through which a cubic must pass,
-_SHORT = 400  # or this part of the record
-_NEAR = 20  # part of the record on each side, in which the body must move
-_MOVING = 0.1  # of the range of the readings
-_CONTINUES = 0.02  # of the range near the jump
+# multiple of the usual step: a longer gap in a record without an oscillation is a jump of the clock
+_JUMP = 50.0
+_JOINED = 6  # number of samples on each side of a jump for the fit of a cubic,
+_SHORT = 400  # or a 400th of the record
+_NEAR = 20  # the body must move in a 20th of the record on each side
+_MOVING = 0.1  # share of the range of the readings
+_CONTINUES = 0.02  # share of the range near the jump
 _BEYOND = 1.0  # ranges of the other readings: a value farther away stands for a missing one
 MINIMUM_CYCLES = 3.0
 # The count is uncertain, most with heavy damping or a drifting sensor; a run of three cycles must pass.
@@ -119,7 +122,7 @@ def checked_record(
     where: str,
     drive: Input | None = None,
 ) -> Record:
-    """The record of a run, unless it or its input is refused."""
+    """The record of a run, unless the record or its input is refused."""
     increasing_times(time_s, sensor.sample_rate, where)
     angle, judged = sensor.derivative == 0, sensor.plausible is not False
     swing = 0.5 * (float(reading.max()) - float(reading.min()))  # the sensor's zero is unknown
@@ -177,7 +180,7 @@ def checked_record(
 def _spoilt(record: Record) -> tuple[str, str] | None:
     """The reason why an oscillation is hidden, and the remedy: a jump of the clock, or a code for a missing value.
 
-    Whether it does is tried: without it the record has three cycles.
+    Each is confirmed by a trial: without it the record has three cycles.
     """
     at = clock_jump(record)
     if at is not None and _oscillates(without_jump(record, at)):
@@ -202,7 +205,7 @@ def _oscillates(record: Record) -> bool:
 def clock_jump(record: Record) -> int | None:
     """The sample after which the times jump while the reading continues; None where there is none.
 
-    Across samples that are missing a swing does not continue with the same value and slope.
+    across missing samples a swing does not continue with the same value and slope
     """
     steps = np.diff(record.time_s)
     at = int(np.argmax(steps))
@@ -225,7 +228,7 @@ def clock_jump(record: Record) -> int | None:
 
 
 def without_jump(record: Record, at: int) -> Record:
-    """A record whose times go on without the jump after a sample."""
+    """A record with continuous times: the jump after a sample is removed."""
     steps, time = np.diff(record.time_s), record.time_s.copy()
     time[at + 1 :] -= steps[at] - float(np.median(steps))
     return Record(time, record.yaw_rad)
@@ -241,10 +244,10 @@ def jump_words(record: Record, at: int) -> str:
 
 
 def standing_for_missing(reading: Readings) -> NDArray[np.bool_] | None:
-    """Which readings have a value far from all others, such as -9.99; None where there are none, or most have it.
+    """Mask of readings far from all others, such as -9.99; None if there are none, or if most are.
 
     Args:
-        reading: shape (n,).
+        reading: reading, shape (n,).
     """
     for value in (float(reading.min()), float(reading.max())):
         standing = np.asarray(reading == value)
@@ -258,7 +261,7 @@ def standing_for_missing(reading: Readings) -> NDArray[np.bool_] | None:
 
 
 def few_samples(record: Record) -> str:
-    """A remark on a free decay of few samples per cycle; empty where it has enough."""
+    """A remark on a free decay with few samples per cycle; empty if it has enough."""
     cycles = count_cycles(record)
     per_cycle = record.yaw_rad.size / cycles if cycles > 0.0 else np.inf
     if per_cycle >= FEW_SAMPLES_PER_CYCLE:

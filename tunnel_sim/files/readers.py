@@ -25,8 +25,8 @@ class FileTable:
     """The table of a run file: at least its columns of times, readings and input.
 
     Args:
-        names: of all columns of the file, also of columns that are not in the frame.
-        text: whether its cells are texts, below a line of headings.
+        names: names of all columns of the file, including columns that are not in the frame.
+        text: whether the cells are texts, below a line of headings.
     """
 
     frame: pl.DataFrame
@@ -39,12 +39,12 @@ class Reader:
     """The reader of one format. Its functions raise `TunnelError` for content of another format, or too large.
 
     Args:
-        limit: largest file, bytes.
-        read_run: the table of a campaign's run file, from its content, its name for messages, and the greatest
-            number of samples; None where such files are not run files.
-        read_tables: the tables of an instrument's file, from its content and its name for messages; it runs in a
-            process with limits. None where such files are imported as text.
-        run_apart: whether run files, too, are read in that process, because damaged ones make a library print or
+        limit: maximum size of a file, bytes.
+        read_run: function for a campaign's run file: its table from its content, its name for messages, and the
+            maximum number of samples; None if such files are not run files.
+        read_tables: function for an instrument's file: its tables from its content and its name for messages;
+            it runs in a process with limits. None if such files are imported as text.
+        run_apart: whether run files are also read in that process, because damaged ones make a library print or
             end its process.
     """
 
@@ -74,10 +74,11 @@ READERS: Mapping[str, str] = {
     ".jsonl": "tunnel_sim.files.importing.formats.json_tables:JSON_LINES",
     ".ndjson": "tunnel_sim.files.importing.formats.json_tables:JSON_LINES",
 }
-"""Where the `Reader` of each ending is. A new format is a reader and a line; other files are imported as text."""
+"""The place of the `Reader` for each ending. A new format is a reader and a line; other files are imported as
+text."""
 
 RUN_ENDINGS = (".csv", ".parquet")
-"""The endings of `READERS` whose readers read run files, known without loading them."""
+"""The endings of `READERS` for run files, known without loading the readers."""
 
 
 def reader_place(ending: str) -> str | None:
@@ -86,7 +87,7 @@ def reader_place(ending: str) -> str | None:
 
 
 def load_reader(ending: str) -> Reader | None:
-    """The reader of files with an extension, as in `reader_place`; None where there is none."""
+    """The reader of files with an extension, as in `reader_place`; None if there is none."""
     place = reader_place(ending)
     if place is None:
         return None
@@ -101,7 +102,7 @@ def load_reader(ending: str) -> Reader | None:
 
 
 def run_endings() -> list[str]:
-    """The extensions of a campaign's run files, with their dots, including those of installed packages."""
+    """The extensions of a campaign's run files, with their dots; installed packages may add some."""
     readers = ((ending, load_reader(ending)) for ending in {**READERS, **_added_places()})
     return [ending for ending, reader in readers if reader is not None and reader.read_run is not None]
 
@@ -120,7 +121,7 @@ def faults(kind: str, where: str) -> Iterator[None]:
     except (TunnelError, MemoryError):  # the guard reports memory
         raise
     except BaseException as error:
-        # A panic of a library in Rust is not a subclass of Exception, and has no name to import.
+        # a panic of a library in Rust is not a subclass of Exception, and has no name to import
         if not isinstance(error, Exception) and type(error).__name__ != "PanicException":
             raise
         what = f"is not {kind} that can be read ({one_line(str(error) or type(error).__name__, 60)})"

@@ -25,7 +25,7 @@ from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
 if TYPE_CHECKING:
     import polars as pl
 
-_MOST_NAMES = 1000  # of a folder that are compared
+_MOST_NAMES = 1000  # number of files of a folder that are compared
 _MARKER = "campaign.toml"
 
 
@@ -45,7 +45,7 @@ def nearest_campaign(folder: Path) -> str:
 
 
 def inside(folder: Path) -> str:
-    """The remedy where a folder is given instead of a file: its kind, or a file in it; empty if none."""
+    """The remedy if a folder is given instead of a file: its kind, or a file in it; empty if there is none."""
     if (folder / _MARKER).is_file():
         return "it is a campaign, which tunnel identify and tunnel diagnose take"
     files = sorted(entry.name for entry in _entries(folder) if (folder / entry.name).is_file())
@@ -146,7 +146,7 @@ def check_lines(content: bytes, where: str, remedy: str) -> None:
     """Refuse bytes that are not lines of text: with NUL bytes, or with longer lines than in a table.
 
     Args:
-        remedy: for NUL bytes in the text.
+        remedy: remedy for NUL bytes in the text.
     """
     nul = content.find(b"\0")
     if nul >= 0:
@@ -167,7 +167,7 @@ PACKED = ".gz"
 
 
 def stem_of(path: Path) -> str:
-    """The name of a file without its ending, and without that of its content where it is compressed."""
+    """The name of a file without its ending, and, if it is compressed, without its content's ending."""
     return Path(path.stem).stem if path.suffix.lower() == PACKED else path.stem
 
 
@@ -198,7 +198,7 @@ def is_blank(content: bytes) -> bool:
 
 
 def read_json(path: Path, *, remedy: str) -> dict[str, Any]:
-    """Read a JSON object; the remedy is for a file that is missing or malformed."""
+    """Read a JSON object; the remedy is for a missing or malformed file."""
     content = read_regular(path, limits.JSON_BYTES, missing=remedy, readable=remedy)
     return parse_json(content, shown(path), remedy)
 
@@ -247,7 +247,7 @@ def check_shape(document: Mapping[str, Any], where: str, remedy: str) -> None:
 def frame_schema(
     content: bytes, where: str, remedy: str, *, rows: int, counted: str = "rows"
 ) -> dict[str, pl.DataType]:
-    """The types by name of a Parquet file whose metadata states an acceptable size; no row is read."""
+    """The types by name of a Parquet file with an acceptable size in its metadata; no row is read."""
     import polars as pl
 
     with _parquet_faults(where, remedy):
@@ -296,7 +296,7 @@ def as_described(what: str, where: str, remedy: str) -> Iterator[None]:
     try:
         yield
     except Exception as error:
-        by_polars = type(error).__module__.startswith("polars.")  # known by name: Polars is slow to load
+        by_polars = type(error).__module__.startswith("polars.")  # recognised by name: Polars is slow to load
         if not (by_polars or isinstance(error, _FAULTS)):
             raise
         raise TunnelError(f"{what} ({_reason(error)})", where=where, remedy=remedy) from None
@@ -304,7 +304,8 @@ def as_described(what: str, where: str, remedy: str) -> Iterator[None]:
 
 def _reason(error: Exception) -> str:
     """A parser's message about its input; for a value of a wrong type, the key and the right type."""
-    from pydantic import ValidationError  # slow to load; needed for faults only
+    # imported here because it is slow to load, and needed for faults only
+    from pydantic import ValidationError
 
     if isinstance(error, ValidationError):
         first = error.errors(include_url=False)[0]

@@ -33,10 +33,10 @@ USED_COLUMNS = (
     *(name for one in FREEDOMS.values() for names in one.columns.values() for name in names),
     *dict.fromkeys(name for one in FREEDOMS.values() for name in one.inputs),
 )
-"""The columns of a run file that are read; others are left alone."""
+"""The columns that are read from a run file; others are ignored."""
 
 RUN_FORMATS = ("parquet", "csv")
-"""Formats that are written."""
+"""Formats for writing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +44,8 @@ class RunTableValues:
     """The content of a run file.
 
     Args:
-        time_s: None without a column time_s.
-        input: in the unit of its column; None for a free decay.
+        time_s: times; None without a column time_s.
+        input: input in the unit of its column; None for a free decay.
     """
 
     time_s: Times | None
@@ -89,7 +89,7 @@ def read_input(path: Path, where: str) -> tuple[Times, InputColumn, PerSample]:
 def _read(
     work: Work, given: dict[str, Any], path: Path, where: str, missing: str, holds: str
 ) -> tuple[dict[str, Any], list[Array]]:
-    """The columns of a run file, read here, or in the kept process where its reader or Polars needs that."""
+    """The columns of a run file, read here, or in the kept process if its reader or Polars requires that."""
     ending = path.suffix.lower()
     readable = f"name a readable {' or '.join(RUN_ENDINGS)} file"
     reader, _ = _reader(ending, where)
@@ -150,7 +150,7 @@ def _table(given: dict[str, Any], contents: list[bytes]) -> Message:
     used = [name for name in ("time_s", column, driven) if name in names and name is not None]
     table = held.frame.select(used)
     if held.text:
-        # A text table without the blank lines at its end.
+        # a text table without the blank lines at its end
         blank = table.select(pl.all_horizontal(pl.all().is_null())).to_series().to_numpy()
         filled = np.flatnonzero(~blank)
         table = table.head(int(filled[-1]) + 1 if filled.size else 0)
@@ -189,7 +189,7 @@ def table_bytes(
     given: dict[str, Array] = {} if drive is None else {freedom.own_input(drive.column): drive.values}
     reading = next(iter(freedom.columns[quantity]))
     table = pl.DataFrame({"time_s": record.time_s, reading: record.yaw_rad, **given})
-    # CSV values have the fewest digits that are read as the same float.
+    # CSV values have as few digits as identify the float
     return encoded(path, table.write_csv if path.suffix == ".csv" else table.write_parquet)
 
 
@@ -212,7 +212,7 @@ def _numbers(series: pl.Series, text: bool, where: str) -> Array:
     else:
         numbers = series.cast(pl.Float64)
     values: NDArray[np.float64] = numbers.fill_null(np.nan).to_numpy()
-    bad = np.flatnonzero(~(np.abs(values) <= limits.LARGEST_NUMBER))  # true for NaN as well
+    bad = np.flatnonzero(~(np.abs(values) <= limits.LARGEST_NUMBER))  # also true for NaN
     if bad.size:
         at = int(bad[0])
         cell = series[at]
@@ -236,7 +236,8 @@ def _read_csv(content: bytes, where: str, most: int) -> FileTable:
     check_count(lines - 1, most, "samples", where, "split the file, or thin it out")
     check_count(lines * columns, limits.CELLS, "cells", where, "leave out columns that are not needed")
     try:
-        # All columns, though few are used: Polars does not detect an extra value in a line that it reads in part.
+        # all columns, though few are used: Polars does not detect an extra value in a line that it reads in
+        # part
         rows = pl.read_csv(content, has_header=False, infer_schema=False, quote_char=None)
     except pl.exceptions.PolarsError as error:
         what = f"not a comma-separated table ({one_line(error, 60)})"
@@ -253,7 +254,7 @@ def _read_csv(content: bytes, where: str, most: int) -> FileTable:
     twice = next((name for name in names if name in USED_COLUMNS and names.count(name) > 1), None)
     if twice is not None:
         raise TunnelError(f"the column {twice} occurs twice", where=where, remedy="leave one of them out")
-    # Other columns without a name, or with a shared one, are named by their position.
+    # other columns without a name, or with a duplicate name, are named by their position
     names = [name if name and names.count(name) == 1 else f"(column {i + 1})" for i, name in enumerate(names)]
     used = [i for i, name in enumerate(names) if name in USED_COLUMNS]
     frame = rows[1:, used]

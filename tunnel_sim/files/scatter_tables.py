@@ -22,7 +22,7 @@ class RepeatabilityTable(StrictModel):
 
     @property
     def value(self) -> Repeatability | None:
-        """The statement of the table; None if it is empty."""
+        """The value stated by the table; None if the table is empty."""
         found = Repeatability(**self.model_dump())
         return found if found.stated else None
 
@@ -46,5 +46,5 @@ class ScatterTable(StrictModel):
 
     @property
     def value(self) -> Scatter:
-        """The statement of the table."""
+        """The value stated by the table."""
         return Scatter(**self.model_dump())

@@ -30,7 +30,7 @@ class StrictModel(BaseModel):
 
 
 def optional(description: str, title: str | None = None) -> Any:
-    """A field that may be left out: None; a page shows it under its title."""
+    """A field that may be left out: then it is None; a page shows it under its title."""
     return Field(default=None, description=description, title=title)
 
 
@@ -74,7 +74,7 @@ def load_toml(path: Path, *, missing: str) -> dict[str, Any]:
 
 
 def _check_magnitudes(value: object, where: str, key: str = "") -> None:
-    """Refuse numbers whose powers would overflow or underflow; the schema refuses NaN and infinities."""
+    """Refuse numbers with powers that overflow or underflow; the schema refuses NaN and infinities."""
     if isinstance(value, Mapping):
         for name, one in value.items():
             _check_magnitudes(one, where, name)
@@ -89,7 +89,7 @@ def _check_magnitudes(value: object, where: str, key: str = "") -> None:
 
 
 def check_version(document: Mapping[str, Any], path: Path) -> None:
-    """Refuse a document whose ``schema_version`` this program cannot read."""
+    """Refuse a document with a ``schema_version`` that this program cannot read."""
     remedy = f"put schema_version = {SCHEMA_VERSION} at the top of the file"
     if "schema_version" not in document:
         raise TunnelError("no schema_version", where=shown(path), remedy=remedy)
@@ -115,7 +115,7 @@ def validate(model: type[ModelT], document: Mapping[str, Any], path: Path) -> Mo
         problems = error.errors(include_url=False)
         problem = next((p for p in problems if p["type"] == "extra_forbidden"), problems[0])
         loc, kind = problem["loc"], problem["type"]
-        # The place: run 'r01', [[effects]] number 2, [rig], or nothing for the top level.
+        # the place: run 'r01', [[effects]] number 2, [rig], or nothing for the top level
         first, number = loc[0], loc[1] if len(loc) >= 2 else None
         where = shown(path)
         if first == "runs" and isinstance(number, int):
@@ -129,7 +129,7 @@ def validate(model: type[ModelT], document: Mapping[str, Any], path: Path) -> Mo
             where += f", [{first}]"
         key_at = max((i for i, part in enumerate(loc) if isinstance(part, str)), default=0)
         key = str(loc[key_at])
-        table: type[StrictModel] | None = model  # that contains the key
+        table: type[StrictModel] | None = model  # the table that contains the key
         for part in loc[:key_at]:
             if isinstance(part, str) and table is not None:
                 field = table.model_fields.get(part)

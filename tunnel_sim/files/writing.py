@@ -1,8 +1,8 @@
 """Output files: written whole or not at all, as text and as JSON.
 
-While a file or folder is being written, it has the temporary name ``.NAME.MARK.partial`` next to its target;
-a folder about to be replaced is renamed ``.NAME.MARK.replaced``. The mark gives machine, process and its
-start time, so that another command can recognise the leftovers of a killed one.
+While a file or folder is being written, it has the temporary name ``.NAME.MARK.partial`` next to its target; a
+folder about to be replaced is renamed ``.NAME.MARK.replaced``. The mark gives machine, process and its start
+time, so that another command can recognise the leftovers of a killed command.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def _encoded(document: object, **layout: Any) -> str:
 
 
 def _not_finite(value: object, place: str = "the document") -> str | None:
-    """The place of the first number that is not finite; None where there is none."""
+    """The place of the first number that is not finite; None if there is none."""
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
     if isinstance(value, float):
@@ -144,7 +144,7 @@ def _machine() -> str:
 
 
 def _runs(pid: int, start: int) -> bool:
-    """Whether the process named by a mark is still running; True where that cannot be determined."""
+    """Whether the process named by a mark is still running; True if that cannot be determined."""
     if os.name != "posix":
         return True
     try:
@@ -171,7 +171,7 @@ _PASSED_ON = (TunnelError, BrokenPipeError, KeyboardInterrupt, SystemExit, Gener
 
 
 def output_folder(folder: Path) -> Path:
-    """Create a folder for output, with its parents; refused where it is a file or cannot be written to."""
+    """Create a folder for output, with its parents; refused if it is a file or cannot be written to."""
     with refusals(folder):
         _make(folder)
         with tempfile.TemporaryFile(dir=folder):
@@ -268,7 +268,7 @@ def whole_folder(folder: Path, *, replace: bool) -> Iterator[Path]:
                 with suppress(OSError):
                     target.rmdir()  # an empty folder may be in the way
             try:
-                partial.rename(target)  # the system refuses it where a folder has content
+                partial.rename(target)  # the system refuses this if a folder has content
             except BaseException as error:  # also for an interruption: the old folder must be restored
                 if replace and replaced.exists():
                     replaced.rename(target)
@@ -298,7 +298,7 @@ def refusals(path: Path, kinds: tuple[type[BaseException], ...] = (BaseException
 
 
 def _target(path: Path) -> Path:
-    """The file that a path refers to; refused where no file can be written."""
+    """The file to which a path refers; refused if no file can be written there."""
     with refusals(path):
         if path.is_dir() or path.is_block_device():
             kind = "folder" if path.is_dir() else "disk"
@@ -315,6 +315,6 @@ def _write_to(descriptor: int, content: bytes) -> None:
 
 
 def _make(folder: Path) -> None:
-    """Create a folder with its parents, and remember which were missing."""
+    """Create a folder with its parents, and remember the missing ones."""
     _made.extend(path for path in (folder, *folder.parents) if not path.exists())
     folder.mkdir(parents=True, exist_ok=True)

@@ -1,7 +1,7 @@
 """An actuator between the stated input and the body: its greatest moment, its greatest rate of change, its lag.
 
-They act in this order: a clipped command changes at a limited rate, and the moment follows it with a lag. So the
-moment obeys both limits for any lag. Before the first sample the input has been constant for long.
+They act in this order: a clipped command changes at a limited rate, and the moment follows it with a lag. The
+moment therefore obeys both limits for any lag. Before the first sample the input has been constant for long.
 """
 
 from __future__ import annotations
@@ -14,13 +14,15 @@ import numpy as np
 from tunnel_sim.vocabulary.quantities import PerSample, Times
 from tunnel_sim.vocabulary.record import Array
 
-_JUMP = 1e-8  # of an interval, the duration of a jump: the integrator cannot separate a shorter part from rounding
-_ULPS = 8.0  # at least, so that the times still increase in other units
-_EVEN = 1e-9  # of an interval: a smaller departure from even samples is rounding
-_SERIES = 0.01  # interval over time constant, below which a series is more accurate
-_FIRST_LOOK = 32  # intervals of the first search for the end of a ramp
-_BENT = 0.03  # change of an input over the greatest moment, or over itself, in which a soft limit is nearly a line
-_BEYOND = 1e6  # of the greatest moment: a soft limit is then reached to one part in a million
+# duration of a jump, as a share of an interval: the integrator cannot separate a shorter part from rounding
+_JUMP = 1e-8
+_ULPS = 8.0  # minimum duration in units of a time's last digit: times still increase in other units
+_EVEN = 1e-9  # share of an interval: a smaller departure from even samples is rounding
+_SERIES = 0.01  # interval over time constant below which a series is more accurate
+_FIRST_LOOK = 32  # number of intervals of the first search for the end of a ramp
+# change of an input over the greatest moment, or over itself, for which a soft limit is nearly a line
+_BENT = 0.03
+_BEYOND = 1e6  # multiple of the greatest moment at which a soft limit is reached to one part in a million
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,11 +68,11 @@ class InputSamples:
     def saturated(self, limit: float, softness: float) -> Self:
         """The input v limited softly: v / (1 + |v/L|^(1/s))^s, which approaches ±L (Rapp 1991).
 
-        Exact for a held input. A linear one is followed at points between which it changes by `_BENT` of the limit
-        at most, or of itself beyond the limit.
+        Exact for a held input. A linear input is followed at points between which it changes by at most `_BENT`
+        of the limit, or of itself beyond the limit.
 
         Args:
-            limit: L above 0, in the unit of the values.
+            limit: limit L, above 0, in the unit of the values.
             softness: s, dimensionless; at 0 it is `clipped`, and near 0.4 a hyperbolic tangent.
         """
         if softness == 0.0:
@@ -105,7 +107,8 @@ class InputSamples:
             return self
         ramps = _Ramps(self, rate)
         steep = np.flatnonzero(np.abs(jump) > rate * width)
-        free = np.ones(width.size, np.bool_)  # intervals at whose end the input is reached without a ramp
+        # intervals at the end of which the input is reached without a ramp
+        free = np.ones(width.size, np.bool_)
         at = 0
         while at < steep.size:
             end = ramps.follow(int(steep[at]), float(self.after[steep[at] - self.held]))
@@ -168,10 +171,10 @@ class _Ramps:
 
         Args:
             first: the interval.
-            value: reached before it.
+            value: value reached before it.
 
         Returns:
-            The first interval at whose start the input is reached.
+            The first interval with the input reached at its start.
         """
         given, time = self.given, self.given.time_s
         at, look = first, _FIRST_LOOK
@@ -217,7 +220,7 @@ class ActuatorLimits:
         limit: greatest moment, N m; 0: none.
         rate: greatest rate of change of the moment, N m/s; 0: none.
         lag: time constant, s.
-        softness: of the limit's approach, dimensionless (`InputSamples.saturated`); 0: a hard limit.
+        softness: softness of the limit, dimensionless (`InputSamples.saturated`); 0: a hard limit.
     """
 
     limit: float = 0.0
@@ -240,7 +243,7 @@ class ActuatorLimits:
 
 
 DIRECT = ActuatorLimits()
-"""An ideal actuator, which exerts every moment as asked for."""
+"""An ideal actuator, which exerts every demanded moment."""
 
 
 def _shortest(time: Array, width: Array) -> Array:
@@ -259,7 +262,7 @@ def recurrence(factor: np.ndarray, added: np.ndarray) -> np.ndarray:
         Shape (n,).
     """
     if factor.ndim == 0:
-        from scipy.signal import lfilter  # only here: slow to load
+        from scipy.signal import lfilter  # imported here because it is slow to load
 
         return np.asarray(lfilter(np.ones(1), np.array([1.0, -factor.item()]), added))
     factor, state, reach = factor.copy(), added.copy(), 1

@@ -45,11 +45,11 @@ class Expression:
 
     @functools.cached_property
     def names(self) -> frozenset[str]:
-        """The names in it."""
+        """The names in the expression."""
         return frozenset(_names(self.root))
 
     def value(self, values: Mapping[str, float | Array]) -> Array:
-        """The value for numbers or arrays, shape (n,), by name in SI units; not finite where it has none."""
+        """The value for numbers or arrays, shape (n,), by name in SI units; not finite where it is undefined."""
         with np.errstate(all="ignore"):
             return np.asarray(_value(self.root, values), np.float64)
 
@@ -82,7 +82,7 @@ def parse(text: str, names: frozenset[str]) -> Expression:
     return Expression(text, root)
 
 
-_DEEPEST = 24  # values kept at once; the compiled law has room for 32
+_DEEPEST = 24  # maximum number of values kept at once; the compiled law has room for 32
 
 
 def _refused(what: str) -> TunnelError:
@@ -103,7 +103,7 @@ def _node(tree: ast.expr, names: frozenset[str]) -> Node:
             return name
         case ast.UnaryOp(op=ast.USub() | ast.UAdd()):
             negative, inner = False, cast(ast.expr, tree)
-            # In a loop: hundreds of signs are more levels than Python's stack allows.
+            # in a loop, because hundreds of signs exceed Python's recursion limit
             while isinstance(inner, ast.UnaryOp) and isinstance(inner.op, ast.USub | ast.UAdd):
                 negative ^= isinstance(inner.op, ast.USub)
                 inner = inner.operand

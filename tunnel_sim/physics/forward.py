@@ -25,12 +25,12 @@ def integrate(
 ) -> tuple[Array, Array, int]:
     """Integrate runs: angle (rad) and rate (rad/s) of the rod's upper end, shape (runs, samples of the longest).
 
-    The status is 0, or one more than the index of the first run whose motion diverged (that run and
-    the later ones are unset). Beyond the end of a run both are 0.
+    The status is 0, or one more than the index of the first run with a diverging motion (this run and the later
+    ones are unset). Beyond the end of a run both are 0.
 
     Args:
         runs: of `run_dtype`; the arrays behind its pointers must stay alive.
-        samples: of every run, or one number for all, the first at time 0.
+        samples: number of samples of every run, or one number for all, the first at time 0.
     """
     count = len(runs)
     law = np.ascontiguousarray(law, dtype=np.float64)
@@ -112,7 +112,7 @@ def forward_run(settings: RunSettings) -> tuple[NDArray[np.void], Sequence[Array
         }
     names = run_dtype().names
     assert names is not None
-    row = tuple(fields.get(name, 0) for name in names)  # at once: setting single fields is slow
+    row = tuple(fields.get(name, 0) for name in names)  # all fields at once: setting single fields is slow
     return np.array([row], dtype=run_dtype()), (values, imposed, beside, program, *driven)
 
 

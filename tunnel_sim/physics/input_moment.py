@@ -23,8 +23,8 @@ from tunnel_sim.vocabulary.quantities import (
 )
 from tunnel_sim.vocabulary.record import Array, read_only
 
-_EVEN = 1e-6  # of an interval: a smaller departure from even samples is rounding
-_ULPS = 8.0  # of a time: the rounding of a difference of times
+_EVEN = 1e-6  # share of an interval: a smaller departure from even samples is rounding
+_ULPS = 8.0  # in units of a time's last digit: the rounding of a difference of times
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,11 +32,11 @@ class Lines:
     """An input as straight lines, in the form in which runs are integrated side by side.
 
     Args:
-        time_s: of the samples, even, each at the start of a step.
-        values: there, in the unit of the input.
-        slopes: from there on, per s.
-        interval: between the samples, s.
-        delay: time by which it acts later, s.
+        time_s: times of the samples, evenly spaced, each at the start of a step.
+        values: values at these times, in the unit of the input.
+        slopes: slopes from these times on, per s.
+        interval: interval between the samples, s.
+        delay: time by which the input acts later, s.
     """
 
     time_s: Times
@@ -51,11 +51,11 @@ class InputMoment:
     """The moment of an input: linear or constant between its samples, constant before the first and after the last.
 
     Args:
-        time_s: of the samples, since the run's start, increasing.
+        time_s: times of the samples since the run's start, increasing.
         values: at these times, in any unit.
         scale: N m per unit.
-        delay: time by which it acts later than its samples, s.
-        kind: of the input.
+        delay: time by which the moment acts later than its samples, s.
+        kind: kind of the input.
         actuator: limits and lag between the samples and the body.
         offset: an added constant moment, which does not pass through the actuator, N m.
         at_sensor: whether a moment acts at the end of the rod that carries the sensor, as a motor with an encoder
@@ -84,17 +84,17 @@ class InputMoment:
 
     @classmethod
     def of(cls, given: Input, time_s: Times, scale: float, delay: Seconds = 0.0) -> InputMoment:
-        """The moment of a run's input, whose samples are at some times since the run's start."""
+        """The moment of a run's input with samples at some times since the run's start."""
         return cls(time_s, given.values, scale, delay, given.held, given.kind)
 
     @property
     def on_body(self) -> bool:
-        """Whether it acts on the body; else on the rod's upper end, as the spring does."""
+        """Whether the moment acts on the body; else on the rod's upper end, like the spring."""
         return not (self.kind.of_spring or self.at_sensor)
 
     @cached_property
     def exerted(self) -> InputMoment:
-        """The moment behind the actuator, as samples and an offset; none where the scale is 0."""
+        """The moment behind the actuator, as samples and an offset; none if the scale is 0."""
         offset = self.offset if self.scale else 0.0
         if self.actuator == DIRECT and offset == self.offset:
             return self
@@ -113,7 +113,7 @@ class InputMoment:
 
     @property
     def interval(self) -> Seconds:
-        """Time between its samples; 0 where they are not even."""
+        """Time between the samples; 0 if they are not evenly spaced."""
         return _interval(Same(self.time_s))
 
     @property
@@ -129,7 +129,7 @@ class InputMoment:
         return size * float(np.max(np.abs(self.values))), size * float(np.max(rates, initial=0.0))
 
     def on_steps(self, step: Seconds) -> bool:
-        """Whether it acts from sample to sample at even times, each a whole number of steps from 0."""
+        """Whether the moment acts from sample to sample at even times, each a whole number of steps from 0."""
         apart, first = self.interval / step, (self.time_s[0] + self.delay) / step
         within = _EVEN * apart
         return (
@@ -137,7 +137,7 @@ class InputMoment:
         )
 
     def at_steps(self, step: Seconds) -> bool:
-        """Whether its samples are at even times from 0 on, a whole number of steps apart, and it has no delay."""
+        """Whether the samples are at even times from 0 on, a whole number of steps apart, without a delay."""
         return self.delay == 0.0 and abs(self.time_s[0]) <= _EVEN * self.interval and self.on_steps(step)
 
     def at(self, time: Times) -> Moments:
@@ -150,19 +150,19 @@ class InputMoment:
         return np.asarray(acting.scale * acting.values[places])
 
     def means(self, ends: Times) -> PerSample:
-        """Means of the delayed input between successive times since the run's start, which keep its impulse."""
+        """Means of the delayed input between successive times since the run's start, which preserve its impulse."""
         means: Array = _impulses(self.acting, ends)[0] / np.diff(ends)
         return means
 
     def lines(self, step: Seconds, steps: int, *, sampled: bool) -> Lines:
-        """The samples without an actuator as lines; those of the same samples are one object.
+        """The samples without an actuator as lines; equal samples give one object.
 
         Args:
-            step: of the integration.
+            step: step of the integration.
             steps: number of steps.
-            sampled: whether a line runs from sample to sample, which are at the starts of steps; else there is
-                one for each step, with the impulse and the first moment of the input there. The motion of a body
-                then differs by less than the order of step².
+            sampled: whether a line runs from sample to sample, which are at the starts of steps. Else there is
+                a line for each step, with the impulse and the first moment of the input there. The motion of a
+                body then differs by less than the order of step².
         """
         of = Same(self.time_s), Same(self.values), self.held, self.delay
         return _lines_of_samples(*of) if sampled else _lines_of_steps(*of, step, steps)
@@ -173,10 +173,10 @@ class InputMoment:
         """The response of an oscillator at rest to the moment u: q̈ + 2ζω q̇ + ω² q = ω² u, exact for both holds.
 
         Args:
-            frequency: undamped, ω.
+            frequency: undamped angular frequency ω.
             damping_ratio: ζ below 1.
-            time_s: since the run's start, at which it begins at rest.
-            derivative: which derivative of q is returned, per s or s²: 0, 1 or 2.
+            time_s: times since the run's start, at which the oscillator is at rest.
+            derivative: order of the returned derivative of q, per s or s²: 0, 1 or 2.
         """
         ringing = np.sqrt(1.0 - damping_ratio**2)
         pole = frequency * complex(-damping_ratio, ringing)
@@ -192,7 +192,7 @@ class InputMoment:
         Exact for both holds.
 
         Args:
-            root: 1/s.
+            root: root, 1/s.
             time_s: since the run's start, s, shape (n,).
 
         Returns:
@@ -212,7 +212,7 @@ def _pieces(drive: InputMoment, starts: Times) -> tuple[PerSample, PerSample]:
 def _levels(
     drive: InputMoment, kinks: Times, piece: NDArray[np.intp], starts: Times
 ) -> tuple[PerSample, PerSample]:
-    """As `_pieces`, of known pieces between the delayed samples; −1 before the first."""
+    """As `_pieces`, given the pieces between the delayed samples; −1 before the first sample."""
     at = np.clip(piece, 0, kinks.size - 1)
     slope = np.append(np.diff(drive.values) / np.diff(drive.time_s), 0.0)[at]
     slope = np.where((piece < 0) | drive.held, 0.0, slope)
@@ -224,7 +224,7 @@ def _impulses(drive: InputMoment, ends: Times) -> tuple[Array, Array]:
     kinks = drive.time_s + drive.delay
     inside = kinks[(kinks > ends[0]) & (kinks < ends[-1])]
     last, both = ends.size - 1, np.concatenate([ends[:-1], inside])
-    order = np.argsort(both, kind="stable")  # of two sorted parts: fast
+    order = np.argsort(both, kind="stable")  # of two sorted parts, which is fast
     starts, begins = both[order], order < last
     within = np.cumsum(begins) - 1
     piece = np.searchsorted(kinks, ends[0], side="right") - 1 + np.cumsum(~begins)
@@ -266,7 +266,7 @@ def _interval(time_s: Same) -> Seconds:
 
 @lru_cache(maxsize=64)
 def _exerted(time_s: Same, values: Same, held: bool, actuator: ActuatorLimits, scale: float) -> InputSamples:
-    """The samples behind an actuator: one object, by which their lines and responses are kept."""
+    """The samples behind an actuator: one object, so that their lines and responses are cached."""
     given = actuator.exerted(InputSamples(time_s.array, values.array, held), scale)
     return InputSamples(read_only(given.time_s), read_only(given.values), given.held)
 
@@ -294,13 +294,13 @@ class _Course:
     """An input as straight lines from the run's start on, and the places of some times on them.
 
     Args:
-        lengths: of the lines, s, or the three by which they follow each other, shape (lengths,).
-        length: the place of every line's among them, but the last's, shape (lines − 1,).
-        alternate: whether the lines after the first have two lengths by turns.
+        lengths: lengths of the lines, s, or the three lengths that alternate, shape (lengths,).
+        length: index of every line's length among these, except the last line's, shape (lines − 1,).
+        alternate: whether the lines after the first have two alternating lengths.
         level, slope: of the lines, in the unit of the samples, and per s, shape (lines,).
-        line: on which each time is, shape (n,).
+        line: index of the line for each time, shape (n,).
         between: places of the times that are not at a line's start, shape (m,).
-        since: of these, time since their line's start, s, shape (m,).
+        since: for these times, time since their line's start, s, shape (m,).
     """
 
     lengths: Array
@@ -322,7 +322,8 @@ def _course(times: Same, values: Same, held: bool, delay: float, at: Same) -> _C
     level, slope = _pieces(drive, starts + within)
     lengths = np.diff(starts)
     number = np.arange(lengths.size)
-    in_turn = np.where(number > 0, 2 - number % 2, 0)  # as the samples of an input with a lag, and even ones
+    # as for the samples of an input with a lag, and for even ones
+    in_turn = np.where(number > 0, 2 - number % 2, 0)
     rounding = max(within, _ULPS * float(np.spacing(starts[-1])))
     alternate = bool(lengths.size > 2 and np.all(np.abs(lengths - lengths[in_turn]) <= rounding))
     if alternate and drive.interval:

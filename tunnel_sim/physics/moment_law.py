@@ -1,6 +1,6 @@
-"""The compiled moment law: the place of its library, and its names of parameters, states and operations.
+"""The compiled moment law: the path of its library, and its names of parameters, states and operations.
 
-Python reads the names from it, so that it cannot disagree with C about their order (``mjcf/plugin/tables.c``).
+Python reads the names from the library, so that their order always agrees with C (``mjcf/plugin/tables.c``).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from tunnel_sim.vocabulary.errors import REINSTALLING, TunnelError
 from tunnel_sim.vocabulary.record import Array
 
-#: Parameters of the moments of gravity, which load a joint: greatest moment and angle of rest.
+#: Parameters of the moments of gravity that load a joint: greatest moment and angle of rest.
 WEIGHTS = (("gravity_stiffness", "gravity_angle"), ("load_stiffness", "load_angle"))
 
 

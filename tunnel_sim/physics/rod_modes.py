@@ -1,9 +1,10 @@
-"""A run whose rod twists, as a slow motion and a ringing.
+"""A run with a twisting rod, as a slow motion and a ringing.
 
 A rod rings many times faster than the body swings and decays soon, but an integrator has to resolve it to the
-end. Here the two oscillations of the linear rig are separated instead. The slow one is integrated with a rigid
-rod whose inertia, damping and lead of the body give its exact frequency, damping and shape. The ringing, and its
-response to the input of a driven run, are added in closed form. Nonlinear terms act only on the slow motion.
+end. Here the two oscillations of the linear rig are separated instead. The slow oscillation is integrated with
+a rigid rod; inertia, damping and lead of the body are chosen to give the exact frequency, damping and shape.
+The ringing, and its response to the input of a driven run, are added in closed form. Nonlinear terms act only
+on the slow motion.
 """
 
 from __future__ import annotations
@@ -24,9 +25,9 @@ from tunnel_sim.vocabulary.quantities import Angles, Rates, Seconds, Times
 from tunnel_sim.vocabulary.record import Array, read_only
 from tunnel_sim.vocabulary.rig import Rig
 
-#: How many times faster than the body the rod must ring for the two to be separated.
+#: Minimum ratio of the rod's ringing frequency to the body's for the two to be separated.
 SEPARATION = 5.0
-_GONE = 1e-9  # rad: ringing below this is not computed
+_GONE = 1e-9  # rad: smaller ringing is not computed
 _MOST_ITERATIONS = 60
 _CONVERGED = 1e-14  # relative
 
@@ -51,16 +52,16 @@ class Ringing:
     """The rod's contribution to the slow motion of its upper end: Re(amplitude · exp(root · t)) and responses, rad.
 
     Args:
-        amplitude: of the ringing after the release, rad.
+        amplitude: amplitude of the ringing after the release, rad.
         root: 1/s, Im > 0.
-        responses: to the input of a driven run, beside that of the slow motion.
+        responses: responses to the input of a driven run, in addition to the slow motion's.
     """
 
     amplitude: complex
     root: complex
     responses: Sequence[Response] = ()
 
-    # a ringing may grow without bound; the caller looks for it
+    # a ringing may grow without bound; the caller checks for it
     @np.errstate(over="ignore", invalid="ignore")
     def added(self, angle: Angles, rate: Rates, interval: Seconds) -> tuple[Angles, Rates]:
         """Angle and rate of the slow motion, at equal intervals from the release, with the ringing."""
@@ -89,8 +90,8 @@ class SlowMotion:
     """A run with a rigid rod and the slow oscillation of the run with a flexible rod.
 
     Args:
-        lead: of the body before the upper end, as a share of the angle there.
-        rod_stiffness: of the leading rod, seen from the upper end, N m/rad.
+        lead: lead of the body over the upper end, as a share of the angle there.
+        rod_stiffness: stiffness of the leading rod, seen from the upper end, N m/rad.
         body_release: the body's release angle, rad.
     """
 
@@ -109,13 +110,13 @@ class SlowMotion:
 
 @dataclass(frozen=True)
 class _TwoMasses:
-    """The linear rig with a flexible rod, whose angles are those of the upper end and of the body.
+    """The linear rig with a flexible rod; its angles are the upper end's and the body's.
 
     Args:
         upper, lower: inertia at either end of the rod, kg m².
         spring, loss: stiffness (N m/rad) and damping (N m s/rad) at the upper end.
-        rod, rod_loss: of the rod.
-        air, air_damping: of the air on the body, Ka and Ca.
+        rod, rod_loss: stiffness and damping of the rod.
+        air, air_damping: Ka and Ca of the air on the body.
     """
 
     upper: float
@@ -152,7 +153,7 @@ class _TwoMasses:
         lead, slow = 0j, 0j
         for _ in range(_MOST_ITERATIONS):
             previous = slow
-            # the balance of the whole rig, whose body moves 1 + lead times as far as the upper end
+            # the balance of the whole rig: the body moves 1 + lead times as far as the upper end
             body = 1.0 + lead
             slow = _upper_root(
                 self.upper + self.lower * body,
@@ -202,7 +203,7 @@ def slow_motion(run: RunSettings, rig: Rig) -> SlowMotion | None:
     found = np.linalg.solve(np.array(matrix), state).tolist()
     slow, ringing = complex(found[0], found[1]), complex(found[2], found[3])
     body = 1.0 + lead.real
-    air = linear.air * body**2  # a moment on the body does work on its own angle
+    air = linear.air * body**2  # a moment on the body does work on the body's angle
     strained = linear.rod * lead.real**2
     inertia = (linear.spring + strained - air) / abs(root) ** 2
     if not inertia > 0.0:

@@ -1,8 +1,8 @@
-"""The physics of runs as numbers: a table with a row for every run, and one run, which is a row.
+"""The physics of runs as numbers: a table with a row for every run, and a single run, which is one row.
 
-Effects change tables; MuJoCo and the forward integrator take runs. At the release the body is held at its angle,
-at rest, and its rod is in balance with the spring. With a rod of compliance c and a spring Kr, the body's angle is
-1 + Kr c times that of the spring's end.
+Effects change tables; MuJoCo and the forward integrator take runs. At the release the body is held at its
+angle, at rest, and its rod is in balance with the spring. With a rod of compliance c and a spring Kr, the
+body's angle is 1 + Kr c times the angle of the spring's end.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ class RodTwist:
     Args:
         compliance: 1/Krod, rad/(N m), positive.
         inertia_share: share of Izz at the rod's upper end, 0 < share < 1.
-        damping_ratio: of the twist, as a fraction of critical.
+        damping_ratio: damping of the twist, as a fraction of critical.
     """
 
     compliance: float
@@ -129,7 +129,8 @@ class SettingsTable:
     """The physics of many runs, which effects change in place; the fields of `RunSettings`, by run.
 
     Args:
-        numbers: by column (`column_places`), in their units, shape (runs, columns); those of the rig are 0.
+        numbers: numbers by column (`column_places`), in their units, shape (runs, columns); the rig's columns
+            are 0.
     """
 
     numbers: Array
@@ -140,7 +141,7 @@ class SettingsTable:
 
     @classmethod
     def empty(cls, count: int) -> SettingsTable:
-        """A table of this many runs whose numbers are 0, until they are set, and whose steps are the usual ones."""
+        """A table of this many runs with all numbers at 0, to be set later, and the usual steps."""
         numbers = np.zeros((count, len(column_places())))
         numbers[:, column_places()["timestep"]] = _USUAL_STEP
         return cls(numbers, [{}] * count, [None] * count, [()] * count, [None] * count)
@@ -203,7 +204,7 @@ class SettingsTable:
         """Set parameters of the moment law in some runs.
 
         Args:
-            values: by name, in their units (see ``mjcf/plugin/README.md``).
+            values: values by name, in their units (see ``mjcf/plugin/README.md``).
 
         Raises:
             TunnelError: when a name is unknown or belongs to a field of `RunSettings`.
@@ -219,17 +220,17 @@ class SettingsTable:
         """Add a moment on the rod's upper end to one run.
 
         Args:
-            program: of the moment, as for ``program`` of `RunSettings`.
+            program: program of the moment, as for ``program`` of `RunSettings`.
         """
         before = self.program[place]
         add = (float(operation_names().index("add")),) if before else ()
         self.program[place] = (*before, *program, *add)
 
     def deviate(self, name: str, deviations: PerRun) -> None:
-        """Change wind speed, spring or mechanical damping from their statements by a share; never below zero.
+        """Change wind speed, spring or mechanical damping from their stated values by a share; never below zero.
 
         Args:
-            name: of the column.
+            name: name of the column.
             deviations: relative, dimensionless.
         """
         factors = np.maximum(0.0, 1.0 + deviations)
@@ -262,14 +263,14 @@ class SettingsTable:
 
 
 class _Field:
-    """A field of `RunSettings`, which the run's table keeps under the same name."""
+    """A field of `RunSettings` that the run's table stores under the same name."""
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
 
 
 class _Number(_Field):
-    """A number; without a usual value it has to be given."""
+    """A number; without a default it must be given."""
 
     def __init__(self, usual: float | None = None) -> None:
         self.usual = usual
@@ -328,21 +329,22 @@ class RunSettings:
     """The physics of one run: a row of a `SettingsTable`.
 
     Args:
-        table: of this run alone, which holds all other fields.
+        table: table of this run alone, which holds all other fields.
         spring_stiffness: Kr, N m/rad.
         derivatives: Cnβ and Cnr, 1/rad.
         yaw_inertia: Izz, kg m².
         mechanical_damping: Cr, N m s/rad.
         wind_speed: V, m/s; ignored where ``series`` gives it.
         air_density: ρ, kg/m³.
-        release_angle: rad, of the body.
-        release_rate: rad/s; the rig itself releases from rest.
-        duration, timestep: of the run, and of an integration step, s.
+        release_angle: release angle of the body, rad.
+        release_rate: release rate, rad/s; the rig itself releases from rest.
+        duration, timestep: duration of the run, and of an integration step, s.
         parameters: further parameters of the moment law by name (see ``mjcf/plugin/README.md``); the others are
             zero.
         series: sampled inputs by name: ``wind_speed`` in m/s, ``forcing`` as a moment coefficient, and
             ``ambient``, a moment on the body that needs no wind, in N m.
-        program: of a further moment on the rod's upper end (see ``mjcf/plugin/expression.h``); empty: none.
+        program: program of a further moment on the rod's upper end (see ``mjcf/plugin/expression.h``); empty:
+            none.
         mean_speed: mean stated speed of the campaign's runs with the wind on, m/s.
     """
 
@@ -410,12 +412,12 @@ class RunSettings:
 
 
 def spring_end_angle(run: RunSettings) -> float:
-    """Angle of the spring's and sensor's end at the release, rad: the body's own where the rod is rigid."""
+    """Angle of the spring's and sensor's end at the release, rad: the body's own if the rod is rigid."""
     return run.release_angle / _body_per_end(run)
 
 
 def released_by_spring_end(run: RunSettings) -> RunSettings:
-    """The run with the body's release angle, given the angle of the spring's end, which a record shows."""
+    """The run with the body's release angle, from the angle of the spring's end, which a record shows."""
     if run.rod_twist is None:
         return run
     released = run.table.copy()
@@ -434,8 +436,8 @@ class Motion:
     """The true motion of one run at the sensor's sample times.
 
     Args:
-        time_s: from the release.
-        angle, rate: of the rod's upper end, which carries spring and sensor.
+        time_s: times from the release.
+        angle, rate: angle and rate of the rod's upper end, which carries spring and sensor.
     """
 
     time_s: Times
@@ -452,7 +454,7 @@ def sampling(settings: RunSettings, sample_rate: float) -> tuple[int, int]:
     """The number of samples in a run, and of whole integration steps between two samples.
 
     Args:
-        sample_rate: Hz.
+        sample_rate: sample rate, Hz.
     """
     if not limits.SLOWEST_RATE <= sample_rate <= limits.FASTEST_RATE:
         raise TunnelError(

@@ -44,13 +44,13 @@ class Slopes:
     """Motions and their derivatives by some terms of their law; 0 beyond the end of a run.
 
     Args:
-        angle: of the rod's upper end, rad, shape (n, samples).
-        rate: of the rod's upper end, rad/s, shape (n, samples).
-        by_angle: derivatives of the angle, per unit of the terms, shape (n, columns, samples), NaN where they do
-            not exist; or of the weighted sums, shape (n, columns, samples − 1). Along changes of samples they are
-            last.
-        by_rate: derivatives of the rate, of that shape; none for weighted sums.
-        status: as from `integrate`, or −1 where a run has none.
+        angle: angle of the rod's upper end, rad, shape (n, samples).
+        rate: rate of the rod's upper end, rad/s, shape (n, samples).
+        by_angle: derivatives of the angle, per unit of the terms, shape (n, columns, samples), NaN where they
+            do not exist; or of the weighted sums, shape (n, columns, samples − 1). Derivatives along changes of
+            samples come last.
+        by_rate: derivatives of the rate, of the same shape; none for weighted sums.
+        status: as from `integrate`, or −1 if a run has no derivatives.
     """
 
     angle: Array
@@ -72,13 +72,15 @@ def slopes(
 
     Args:
         runs: as in `terms`.
-        samples: of every run, or one number for all, the first at time 0.
+        samples: number of samples of every run, or one number for all, the first at time 0.
         columns: places of the terms.
-        weights: for derivatives of weighted sums of first and last angle and first and last rate of each interval
-            between samples, shape (n, 4, 1) or (n, 4, samples − 1); None: derivatives of angle and rate.
-        changes: of the runs' samples, along which derivatives are also computed, by run, at most `most_changes`: of
-            the wind, m/s, shape (changes, samples), or of the drive's values and then their slopes, shape (changes,
-            2 samples). In a run with neither the derivatives are NaN.
+        weights: for derivatives of weighted sums of first and last angle and first and last rate of each
+            interval between samples, shape (n, 4, 1) or (n, 4, samples − 1); None: derivatives of angle and
+            rate.
+        changes: changes of the runs' samples along which derivatives are also computed, by run, at most
+            `most_changes`: of the wind, m/s, shape (changes, samples), or of the drive's values and then their
+            slopes, shape (changes, 2 samples). In a run without wind samples or drive these derivatives are
+            NaN.
     """
     law, runs = np.ascontiguousarray(law, dtype=np.float64), np.ascontiguousarray(runs)
     runs["samples"], size = samples, int(np.max(samples))

@@ -1,4 +1,4 @@
-"""The length of an integration step; no other module decides it.
+"""The length of an integration step; no other module determines it.
 
 With the classical Runge–Kutta method of order 4 and steps h, the amplitude of an undamped oscillation of
 angular frequency ω falls by (ωh)⁶/144 per step, and its phase lags by (ωh)⁵/120: a spurious damping ratio of
@@ -7,8 +7,8 @@ its spring (`FREQUENCY_ERROR`), for a flexible rod's own mode to half a radian, 
 `_UNSTABLE`.
 
 Fits predict thousands of runs: their steps are longer (`fit_substeps`), with compensation for their error
-(`compensated`). Reported results are predicted again in shorter steps (`report_substeps`). Steps are only
-divided by whole numbers, so that a sample interval remains a whole number of steps.
+(`compensated`). Reported results are predicted again with shorter steps (`report_substeps`). Steps are divided
+only by whole numbers, so that a sample interval remains a whole number of steps.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ FREQUENCY_ERROR = 1e-6
 BODY_TURN = (120.0 * FREQUENCY_ERROR) ** 0.25
 #: Greatest phase angle of the rod's own mode per step, rad.
 ROD_TURN = 0.5
-#: Greatest number by which a step is divided: a run then takes hundreds of times the usual time and memory.
+#: Maximum number by which a step is divided: a run then takes hundreds of times the usual time and memory.
 MOST_SUBSTEPS = 320
 USUAL_RATE = 1000.0  # steps per second, unless a faster motion requires more
 #: Shortest step, s; slightly less than `MOST_SUBSTEPS` of the usual one, for rounding.
@@ -44,15 +44,15 @@ REPORT_STEP = 2e-3
 
 _FIT_STEP = 8.75e-3  # s: a body at the 2 Hz to which the fits scale time turns by `_FIT_BODY_TURN`
 _FIT_BODY_TURN = 0.11  # rad: once `compensated`, some 1e-6 rad over 10 s
-_FIT_MOST_STRIDE = 3  # block means per step
+_FIT_MOST_STRIDE = 3  # number of block means per step
 #: Parameters of moments that a long step of a fit does not resolve: kinks, and a nonlinear spring.
 _ROUGH = ("friction_moment", "friction_load", "free_play", "gravity_stiffness")
-_FIT_KINKED_TURN = 0.055  # rad: where the spring has a kink, whose error is of second order
+_FIT_KINKED_TURN = 0.055  # rad: for a spring with a kink, which causes an error of second order
 _FIT_SHORTEST = 2e-4  # s, for any stiffness of the rod
 _FIT_MOST_TURN = pi  # rad from one block mean to the next: no record shows a faster oscillation
 _REPORT_ROD_TURN = 0.25  # rad
 _REPORT_SHORTEST = 1e-4  # s
-_REPORT_DELAYED = 4  # times as many steps where the input is delayed
+_REPORT_DELAYED = 4  # factor on the number of steps if the input is delayed
 _UNSTABLE = 2.5  # rad per step; the method diverges beyond 2.8
 _LARGEST = 700.0  # logarithm of nearly the largest float
 _MOST_CONTACT_SUBSTEPS = 40
@@ -84,8 +84,8 @@ def input_substeps(least: int, interval: Seconds, drive: InputMoment) -> int:
     """The number of steps in an interval, at least a given one, that begin at the samples of an input if they can.
 
     Args:
-        interval: between block ends.
-        drive: of the run, without an actuator.
+        interval: interval between block ends.
+        drive: drive of the run, without an actuator.
     """
     if not drive.interval:
         return least
@@ -96,7 +96,7 @@ def input_substeps(least: int, interval: Seconds, drive: InputMoment) -> int:
 def fit_stride(rig: Rig, runs: SettingsTable, interval: DurationPerRun) -> NDArray[np.int64]:
     """Number of block means in one step of a fit, by run; the motion between its ends is cubic.
 
-    The rods are rigid. 1 where a moment has a kink, is sampled, or is not mostly linear.
+    The rods are rigid. 1 if a moment has a kink, is sampled, or is not mostly linear.
     """
     turn = np.maximum(body_rates(rig, runs) * interval, 1e-9)
     turn[~np.isfinite(turn)] = np.inf
@@ -130,8 +130,8 @@ def report_substeps(run: RunSettings, interval: Seconds, block: int) -> int:
     """Number of steps of the reported prediction from one block mean to the next, after an interval.
 
     Args:
-        block: samples in the interval. Steps end at those of an input; a delayed or changed input is given by its
-            means over the steps, which is of second order.
+        block: number of samples in the interval. Steps end at the samples of an input; a delayed or changed
+            input is given by its means over the steps, a method of second order.
     """
     longest = REPORT_STEP
     if run.rod_twist is not None:
@@ -152,7 +152,7 @@ def for_contact(run: RunSettings) -> RunSettings:
     """The run with steps short enough for a rubbing contact.
 
     The motion after a reversal covers at most half the presliding range, and friction that depends on the rate
-    changes the rate by at most half of the friction's own range of rates.
+    changes the rate by at most half of the friction's range of rates.
     """
     law = run.parameters
     reach, friction, peak = (
@@ -178,7 +178,7 @@ def for_contact(run: RunSettings) -> RunSettings:
 
 
 def follow_fastest(rig: Rig, run: RunSettings) -> RunSettings:
-    """The run with steps short enough for its fastest motion; refused where they are below `LEAST_STEP`."""
+    """The run with steps short enough for its fastest motion; refused if they are below `LEAST_STEP`."""
     body, rod = body_rate(rig, run), _rod_rate(run)
     number = max(_substeps(body * run.timestep, BODY_TURN), _substeps(rod * run.timestep, ROD_TURN))
     if number > 1 and run.timestep / number < LEAST_STEP:

@@ -38,7 +38,7 @@ class Number:
         least, most: bounds, in the unit; infinite: none.
         above: whether the number must exceed ``least``.
         whole: whether it must be a whole number.
-        unit: for the remedy.
+        unit: unit, for the remedy.
     """
 
     least: float = 0.0
@@ -81,7 +81,7 @@ COUNT = Number(least=1, whole=True)
 def checked_numbers(
     values: object, name: str, where: str, kind: Number, *, length: int | None = None
 ) -> tuple[float, ...]:
-    """The numbers of a list, each of a kind.
+    """The numbers of a list, each within its allowed values.
 
     Args:
         length: required number of values; None: one or more, without repetition.
@@ -103,7 +103,7 @@ def checked_numbers(
 
 
 def checked_names(given: object, known: Iterable[str], name: str, where: str) -> Mapping[str, Any]:
-    """A mapping whose names are known.
+    """A mapping with known names only.
 
     Raises:
         EnvError: when it is not a mapping, or for the first unknown name, suggesting the closest one.
@@ -119,7 +119,7 @@ def checked_names(given: object, known: Iterable[str], name: str, where: str) ->
 
 
 def checked_choice(value: object, known: Sequence[str], name: str, where: str) -> str:
-    """One of some words; an `EnvError` for another, suggesting the closest one."""
+    """One of some words; an `EnvError` for any other word, suggesting the closest one."""
     if not isinstance(value, str) or value not in known:
         raise EnvError(f"unknown {name} {value!r}", where=where, remedy=did_you_mean(str(value), known))
     return value

@@ -16,21 +16,22 @@ USUAL_SCATTER: Mapping[str, float] = {
     "spring_stiffness": 0.0005,  # a spring clamped again repeats to some hundredths of a per cent
     "mechanical_damping": 0.01,  # bearings and cables repeat to a per cent
 }
-"""Numbers that may differ between runs, with the usual standard deviation in a rig, relative."""
+"""Quantities that may differ between runs, with the usual relative standard deviation in a rig."""
 
 SCATTERED = tuple(USUAL_SCATTER)
-"""These numbers, in the order of a campaign's ``[repeatability]``."""
+"""These quantities, in the order of a campaign's ``[repeatability]``."""
 
 WIDEST_SCATTER = 0.2
-"""Greatest standard deviation between runs, relative: a deviation that reverses the sign has five of them."""
+"""Maximum relative standard deviation between runs: a deviation that reverses the sign is five times as large."""
 
 LARGEST_DRIFT = 0.5
-"""Greatest change from the first to the last run, relative, to either side: more is another spring or speed."""
+"""Maximum relative change from the first to the last run, to either side: a larger one is another spring or
+speed."""
 
 
 @dataclass(frozen=True)
 class Repeatability:
-    """The experimenter's statement on the scatter between runs, as one standard deviation; None where not stated.
+    """The experimenter's statement on the scatter between runs, as one standard deviation each; None: not stated.
 
     Args:
         wind_speed: of the true speed about the stated one, a fraction of it.
@@ -54,7 +55,7 @@ class Repeatability:
 
     @property
     def stated(self) -> dict[str, float]:
-        """The stated numbers, by name, dimensionless."""
+        """The stated values, by name, dimensionless."""
         return {name: value for name, value in vars(self).items() if value is not None}
 
 
@@ -65,8 +66,8 @@ class Scatter:
     Args:
         wind_speed, spring_stiffness, mechanical_damping: standard deviation between runs, a fraction of each.
         zero: standard deviation of the sensor's zero between runs, rad.
-        spring_stiffness_drift, wind_speed_drift_between_runs: change from the first to the last run, proportional
-            to the number of the run, a fraction of each.
+        spring_stiffness_drift, wind_speed_drift_between_runs: change from the first to the last run, in
+            proportion to the number of the run, a fraction of each.
     """
 
     wind_speed: float = 0.0
@@ -89,16 +90,16 @@ class Scatter:
 
     @property
     def _drifts(self) -> dict[str, str]:
-        """The drift of each property that has one."""
+        """The drift of each property that drifts."""
         return {"spring_stiffness": "spring_stiffness_drift", "wind_speed": "wind_speed_drift_between_runs"}
 
     @property
     def stated(self) -> dict[str, float]:
-        """The nonzero numbers, by name, dimensionless, and rad for ``zero``."""
+        """The nonzero values, by name, dimensionless, and rad for ``zero``."""
         return {name: float(value) for name, value in vars(self).items() if value != 0.0}
 
     def deviations(self, rng: np.random.Generator, share: Array) -> list[dict[str, float]]:
-        """Draw the deviations of runs; those of the first runs do not depend on the number of runs.
+        """Draw the deviations of runs; the first runs' deviations do not depend on the number of runs.
 
         Args:
             share: position of each run from the first to the last, 0 to 1, shape (runs,), a fraction.
@@ -129,7 +130,7 @@ def between_runs(seed: np.random.SeedSequence) -> np.random.Generator:
 
 
 def together(one: float, other: float) -> float:
-    """The sum of two deviations; exact where one of them is zero.
+    """The sum of two deviations; exact if one of them is zero.
 
     Args:
         one: relative, dimensionless.
@@ -142,7 +143,7 @@ def along(runs: int) -> Array:
     """Position of each run from the first to the last, from 0 to 1, shape (runs,), a fraction; 0 for a single run.
 
     Args:
-        runs: a count.
+        runs: number of runs.
     """
     return np.arange(runs) / max(1, runs - 1)
 

@@ -29,7 +29,7 @@ Zero = Literal["common", "per_run", "auto"]
 
 @dataclass(frozen=True)
 class RigProperties:
-    """A campaign's statements about its rig; None where nothing is stated.
+    """A campaign's statements about its rig; None: not stated.
 
     Args:
         yaw_inertia: nominal Izz of model and support, kg m².
@@ -52,11 +52,11 @@ class RigProperties:
 
 @dataclass(frozen=True)
 class SensorProperties:
-    """A campaign's statements about its sensor; None where nothing is stated.
+    """A campaign's statements about its sensor; None: not stated.
 
     Args:
-        sample_rate: Hz.
-        resolution: step of the reading, rad (rad/s or rad/s² where it measures a rate or an acceleration).
+        sample_rate: sample rate, Hz.
+        resolution: step of the reading, rad (rad/s or rad/s² if it measures a rate or an acceleration).
         noise_std: standard deviation of the reading's noise, in the same unit.
         plausible: False accepts values that look like a wrong unit, and a low sample rate.
         motion: ``displacement`` of a linear freedom, with m, N, kg in place of rad, N m, kg m²; None: an angle.
@@ -87,7 +87,7 @@ class SensorProperties:
 
     @property
     def derivative(self) -> int:
-        """Which derivative of the angle the readings are: 0, 1 or 2."""
+        """Order of the derivative of the angle that the sensor reads: 0, 1 or 2."""
         return 0 if self.quantity is None else ("angle", "rate", "acceleration").index(self.quantity)
 
 
@@ -99,9 +99,9 @@ class Run:
         wind_speed: V, m/s; 0 is wind-off. The speed at the release, or the mean of a steady speed over the run.
         spring_stiffness: Kr, N m/rad; for a run with a ``command_rad`` the servo's kp; None: the run is identified
             in normalised form.
-        air_density: ρ, kg/m³; required where `needs_density`.
+        air_density: ρ, kg/m³; required if `needs_density`.
         release_angle: nominal, rad.
-        clock_s: time of the file's clock at time 0 of the record, s; 0 where the record has the times of its file.
+        clock_s: time of the file's clock at time 0 of the record, s; 0 if the record has the times of its file.
     """
 
     id: str
@@ -125,26 +125,26 @@ class Run:
 
     @property
     def input_gain(self) -> float | None:
-        """The moment on the body per unit of the input, N m; None where it is not known, and for a free decay."""
+        """The moment on the body per unit of the input, N m; None if it is not known, and for a free decay."""
         if self.drive is None:
             return None
         return self.drive.kind.gain(self.drive.gain, self.spring_stiffness)
 
     @property
     def known_gain(self) -> KnownGain | None:
-        """The gain of the input over the inertia, where the run's motion gives it; None for a free decay too."""
+        """The gain of the input over the inertia, if the run's motion gives it; None for a free decay, too."""
         return None if self.drive is None else self.drive.kind.known_gain(windy=self.wind_on)
 
     def to_xarray(self) -> Dataset:
         """The record as a dataset: ``yaw_rad`` over the coordinate ``time_s``, the conditions as attributes.
 
-        A run does not know its sensor: names are those of an angle.
+        A run does not know its sensor, so the names are an angle's.
 
         Raises:
-            TunnelError: where xarray, of the extra ``frames``, is not installed.
+            TunnelError: when xarray, of the extra ``frames``, is not installed.
         """
         try:
-            from xarray import Dataset  # only here: an extra
+            from xarray import Dataset  # imported here because it is an extra
         except ModuleNotFoundError as error:
             raise TunnelError("xarray is not installed", remedy=f"run {installing('frames')}") from error
         names = ("wind_speed", "spring_stiffness", "air_density", "release_angle")
@@ -166,10 +166,10 @@ def speed_groups(speeds: Iterable[float]) -> dict[float, float]:
     Readings of one setting, such as 24.9972 and 25 m/s, differ by less than the error of a reading.
 
     Args:
-        speeds: as stated, m/s.
+        speeds: stated speeds, m/s.
 
     Returns:
-        By stated speed, the member of its group that is written most briefly, m/s; 0 is a group of its own.
+        By stated speed, the member of its group with the shortest text, m/s; 0 is a group of its own.
     """
     groups: list[list[float]] = []
     for speed in sorted(set(speeds)):
@@ -185,8 +185,8 @@ def mean_wind_speed(speeds: Iterable[float], otherwise: float) -> float:
     """The mean wind speed of the runs with the wind on.
 
     Args:
-        speeds: of all runs as stated, m/s; 0: wind off.
-        otherwise: the value where no run has the wind on, m/s.
+        speeds: stated speeds of all runs, m/s; 0: wind off.
+        otherwise: the value if no run has the wind on, m/s.
     """
     windy = [speed for speed in speeds if speed > 0.0]
     return fmean(windy) if windy else otherwise
@@ -209,7 +209,7 @@ class Campaign(RunGroups[Run]):
     Args:
         name: short name, also of the folder.
         runs: at least one run, with unique ids.
-        law: of the joint in the user's model; None: spring and damper.
+        law: law of the joint in the user's model; None: spring and damper.
         repeatability: stated scatter between runs; None: nothing is stated.
     """
 
@@ -233,16 +233,16 @@ class Campaign(RunGroups[Run]):
 
     @property
     def as_angle(self) -> Campaign:
-        """The campaign with the same numbers as of an angle."""
+        """The campaign with the same numbers, as for an angle."""
         return replace(self, sensor=replace(self.sensor, motion=None))
 
     def driven_by(self, *columns: InputColumn) -> tuple[Run, ...]:
-        """The runs whose input is in one of some columns."""
+        """The runs with an input in one of some columns."""
         pairs = zip(self.driven_runs, self.inputs, strict=True)
         return tuple(run for run, drive in pairs if drive.column in columns)
 
     def checked_inputs(self) -> Campaign:
-        """The campaign, whose driven runs can be identified.
+        """The campaign itself, if its driven runs can be identified.
 
         Raises:
             TunnelError: for the first input that cannot belong to its record or with which no run can be
@@ -266,10 +266,10 @@ class Campaign(RunGroups[Run]):
         """The other runs; the campaign itself if no id is given.
 
         Args:
-            ids: of the runs to leave out.
+            ids: ids of the runs to leave out.
 
         Raises:
-            TunnelError: for an id that no run has, and where no run would remain.
+            TunnelError: for an id that no run has, and if no run would remain.
         """
         if not ids:
             return self
@@ -284,7 +284,7 @@ class Campaign(RunGroups[Run]):
         return replace(self, runs=kept)
 
     def __repr__(self) -> str:
-        """The runs, their conditions, and where to go from here, in three lines."""
+        """The runs, their conditions, and what to call next, in three lines."""
         count = f"{len(self.runs)} run{'' if len(self.runs) == 1 else 's'}"
         on = len(self.in_wind)
         springs = [run.spring_stiffness for run in self.runs if run.spring_stiffness is not None]
@@ -305,6 +305,6 @@ class Campaign(RunGroups[Run]):
 
 
 def _between(values: list[float]) -> str:
-    """Least and greatest, such as ``16.1 to 44.8``; one number where they are equal."""
+    """Least and greatest, such as ``16.1 to 44.8``; one number if they are equal."""
     low, high = (f"{end:.3g}" for end in (min(values), max(values)))
     return low if low == high else f"{low} to {high}"

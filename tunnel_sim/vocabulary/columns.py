@@ -17,7 +17,7 @@ _SECOND = np.timedelta64(1, "s")
 
 
 def read_only(values: ArrayLike) -> Array:
-    """A read-only float64 copy, or the values themselves where they are one already."""
+    """A read-only float64 copy, or the values themselves if they already are one."""
     if type(values) is np.ndarray and values.dtype == np.float64 and _is_constant(values):
         return values
     array = np.array(values, dtype=np.float64)
@@ -34,8 +34,8 @@ def read_only_column(values: object, name: str, where: str, *, times: bool = Fal
     """A read-only float64 copy of a column of finite numbers, shape (n,), as `read_only` makes it.
 
     Args:
-        name: of the column, for messages.
-        times: whether dates and durations are taken, as seconds from the first.
+        name: name of the column, for messages.
+        times: whether to accept dates and durations, as seconds from the first.
 
     Raises:
         TunnelError: for texts, truth values, complex numbers, missing values, and numbers that are not finite.
@@ -56,7 +56,7 @@ def read_only_column(values: object, name: str, where: str, *, times: bool = Fal
         what = f"{name} holds {kind.get(given.dtype.kind, 'texts')}, not numbers"
         raise TunnelError(what, where=where, remedy="give floating-point numbers")
     array = read_only(given)
-    # The extremes alone, without a temporary array; they are NaN where any value is.
+    # the extremes alone, without a temporary array; they are NaN if any value is
     if array.size and not max(-array.min(), array.max()) <= limits.LARGEST_NUMBER:
         wrong = np.flatnonzero(~(np.abs(array) <= limits.LARGEST_NUMBER))
         at = int(wrong[0])
@@ -75,7 +75,7 @@ def _as_array(values: object, name: str, where: str) -> NDArray[Any]:
 
 
 def _of_objects(given: NDArray[Any], name: str, where: str) -> NDArray[Any]:
-    """The array of objects: numbers, or dates with a time zone, which NumPy has no type for."""
+    """The array of objects: numbers, or dates with a time zone, for which NumPy has no type."""
     first = given[0] if given.size else None
     try:
         if hasattr(first, "tzinfo"):

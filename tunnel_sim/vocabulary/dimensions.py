@@ -31,7 +31,7 @@ def beside(unit: str, joint: str = " ") -> str:
     """A unit in a sentence, such as `` N m`` after a number; empty for a dimensionless quantity.
 
     Args:
-        joint: stands before the unit.
+        joint: text before the unit.
     """
     return "" if unit == "1" else f"{joint}{unit}"
 
@@ -40,7 +40,7 @@ def product(one: Dimension, other: Dimension, power: float = 1.0) -> Dimension:
     """The dimension of one quantity times a power of another.
 
     Args:
-        power: exponent of the other, dimensionless.
+        power: exponent of the other quantity, dimensionless.
     """
     kg, m, s = (a + power * b for a, b in zip(one, other, strict=True))
     return kg, m, s
@@ -48,9 +48,9 @@ def product(one: Dimension, other: Dimension, power: float = 1.0) -> Dimension:
 
 @functools.cache
 def dimension(unit: str) -> Dimension:
-    """Powers of kg, m and s of a unit.
+    """Powers of kg, m and s in a unit.
 
-    It has factors separated by spaces with digits for powers, and the denominator after one slash; ``l/V``,
+    A unit has factors separated by spaces with digits for powers, and the denominator after one slash; ``l/V``,
     for a time as a multiple of length over speed, is a number.
     """
     if unit == "l/V":
@@ -82,7 +82,7 @@ def _radians(text: str) -> float:
 
 
 def _factors(text: str, sign: float) -> Dimension | None:
-    """The dimension of a product; None where a factor is unknown."""
+    """The dimension of a product; None if a factor is unknown."""
     found = NUMBER
     for word in text.split() or [""]:
         match = _FACTOR.fullmatch(word)

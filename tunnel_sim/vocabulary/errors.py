@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
 _T = TypeVar("_T")
-_PLACES = 3  # listed of those with the same fault
-_LONGEST = 4096  # characters in one part of a message: the longest path
+_PLACES = 3  # maximum number listed of those with the same fault
+_LONGEST = 4096  # maximum number of characters in one part of a message: the longest path
 
 
 class TunnelError(Exception):
@@ -24,10 +24,10 @@ class TunnelError(Exception):
 
     Args:
         what: the fault, as a short clause.
-        where: the file, run or option concerned; empty when there is none.
+        where: the file, run or option concerned; empty if there is none.
         remedy: how to correct it.
-        options: of ``tunnel import`` that correct it, each with its value, as in a command line.
-        parts: the refusals that it joins; empty where it is a single one.
+        options: options of ``tunnel import`` that correct it, each with its value, as in a command line.
+        parts: the joined refusals; empty if it is a single one.
 
     The text reads ``where: what; remedy`` and is always a single line. The command line prints it and exits with
     status 2.
@@ -52,12 +52,12 @@ class TunnelError(Exception):
 
 
 def asking(option: str, what: str, where: str, more: str = "") -> TunnelError:
-    """A refusal that an option of ``tunnel import`` settles; ``more``: words after it in the remedy."""
+    """A refusal that an option of ``tunnel import`` settles; ``more``: words after the option in the remedy."""
     return TunnelError(what, where=where, remedy=f"give {option}{more}", options=(option,))
 
 
 def attempt(faults: list[TunnelError], make: Callable[[], _T]) -> _T | None:
-    """The result of a function; None where it refuses, and the refusal is then added to the others."""
+    """The result of a function; if it refuses, None, and the refusal is added to the others."""
     try:
         return make()
     except TunnelError as error:
@@ -66,7 +66,7 @@ def attempt(faults: list[TunnelError], make: Callable[[], _T]) -> _T | None:
 
 
 def joined(faults: Sequence[TunnelError]) -> TunnelError:
-    """Refusals of one place, at least one, as one refusal."""
+    """Several refusals about one place as one refusal; at least one."""
     if len(faults) == 1:
         return faults[0]
     faults = _parts(faults)
@@ -87,7 +87,7 @@ def _options(faults: Iterable[TunnelError]) -> Iterator[str]:
 
 
 def together(faults: Sequence[TunnelError]) -> TunnelError:
-    """Refusals of several places, at least one, as one refusal; equal ones are stated once, with their places."""
+    """Refusals about several places as one refusal; equal ones are stated once, with their places. At least one."""
     parts = _parts(faults)
     if len(faults) == 1 and len({part.where for part in parts}) == 1:
         return faults[0]
@@ -171,7 +171,7 @@ def library(name: str, use: str, extra: str, where: str = "") -> Any:
 
 def added_to(group: str) -> dict[str, EntryPoint]:
     """The entry points of a group, such as ``tunnel.effects``, by name."""
-    from importlib.metadata import entry_points  # only here: it would slow every command
+    from importlib.metadata import entry_points  # imported here because it would slow every command
 
     return {point.name: point for point in entry_points(group=group)}
 
@@ -194,7 +194,7 @@ def raised_line(error: BaseException) -> str:
 
 
 def own_traceback(error: BaseException) -> str:
-    """The traceback of an exception from the user's own code on, as Python prints it."""
+    """The traceback of an exception, as Python prints it, starting at the user's own code."""
     frames = traceback.extract_tb(error.__traceback__)
     own = _own_frames(error)
     shown_from = frames.index(own[0]) if own else 0

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 InputColumn = Literal[
     "moment_nm", "drive", "base_rad", "command_rad", "base_acceleration_rad_s2", "base_acceleration_m_s2"
 ]
-"""The columns of a run file that may hold its input, as `INPUTS` describes them."""
+"""The columns of a run file that may hold its input, as described by `INPUTS`."""
 
 _MOMENTS = ("nm", "n m", "n-m", "n*m", "n·m", "newton metre", "newton meter", "n_m")
 _BASE = re.compile(r"(?<![a-z])(base|root)(?![a-z])", re.IGNORECASE)
@@ -45,7 +45,7 @@ _PLAIN = str.maketrans({"²": "2", "^": None, "_": "/", " ": None})
 
 @dataclass(frozen=True)
 class KnownGain:
-    """The gain of an input over the inertia, where the motion alone determines it: per_stiffness · k + constant.
+    """The gain of an input over the inertia, if the motion alone determines it: per_stiffness · k + constant.
 
     Args:
         per_stiffness: rad/s² per unit of the input, for each 1/s² of stiffness over the inertia.
@@ -60,7 +60,7 @@ class KnownGain:
     @overload
     def at(self, stiffness: Array) -> Array: ...
     def at(self, stiffness: float | Array) -> float | Array:
-        """The gain, rad/s² per unit of the input, with a stiffness over the inertia in 1/s², of any shape."""
+        """The gain, rad/s² per unit of the input, for a stiffness over the inertia in 1/s², of any shape."""
         return self.per_stiffness * stiffness + self.constant
 
 
@@ -69,13 +69,13 @@ class InputKind:
 
     Traits, with defaults that a kind overrides:
 
-    - ``column``: of a run file; ``unit``: of its values.
+    - ``column``: its column in a run file; ``unit``: unit of its values.
     - ``meaning``: its description, a clause of an import; ``noun``: a word for it on an axis.
     - ``of_spring``: whether it acts through the spring, and its gain is the spring's stiffness.
     - ``of_base``: whether the base is shaken: the reading is relative to it, and inertial forces act.
     - ``by_inertia``: whether its gain is the body's inertia, with the sign of ``scale``.
-    - ``by_actuator``: whether it is the demand on an actuator, whose lag and limits then change the moment.
-    - ``takes_gain``: whether a run may state ``drive_gain``; where it does not, the gain is fitted.
+    - ``by_actuator``: whether it is the demand on an actuator with a lag and limits that change the moment.
+    - ``takes_gain``: whether a run may state ``drive_gain``; if it does not, the gain is fitted.
     - ``keys``: which of ``drive_gain`` and ``servo_kv`` a run may state.
     - ``scale``: N m per unit; for an input that takes a gain, the factor on the gain.
     - ``amplitudes``: the key of a plan for its peaks; empty: no plan has it.
@@ -97,11 +97,11 @@ class InputKind:
     units: ClassVar[Mapping[str, float]] = {}
 
     def gain(self, stated: float | None, spring_stiffness: float | None) -> float | None:
-        """The moment on the body per unit, N m; None where it is not known.
+        """The moment on the body per unit, N m; None if it is not known.
 
         Args:
-            stated: ``drive_gain`` of the run, N m per unit; None where it states none.
-            spring_stiffness: Kr, N m/rad; None where the run states none.
+            stated: ``drive_gain`` of the run, N m per unit; None if it states none.
+            spring_stiffness: Kr, N m/rad; None if the run states none.
         """
         del stated, spring_stiffness
         return self.scale
@@ -110,7 +110,7 @@ class InputKind:
         """The moment on the body per unit in a simulated run, N m.
 
         Args:
-            gain: for an input whose gain the run does not state, N m per unit.
+            gain: gain of an input for which the run states none, N m per unit.
             spring_stiffness: Kr, N m/rad.
             inertia: Izz, kg m².
         """
@@ -118,7 +118,7 @@ class InputKind:
         return self.scale
 
     def known_gain(self, *, windy: bool) -> KnownGain | None:
-        """The gain over the inertia where it needs neither an inertia nor a stated gain; None elsewhere.
+        """The gain over the inertia, if it needs neither an inertia nor a stated gain; else None.
 
         Args:
             windy: whether the wind blows, which adds to the stiffness.
@@ -147,12 +147,12 @@ class Moment(InputKind):
     amplitudes = "amplitudes_nm"
 
     def holds(self, name: str, unit: str) -> bool:
-        """By the column's name, or a unit of moment."""
+        """Whether the column's name is of this kind, or its unit is a unit of moment."""
         return super().holds(name, unit) or unit.strip().lower() in _MOMENTS
 
 
 class _OfGain(InputKind):
-    """An input whose gain a run may state."""
+    """An input with a gain that a run may state."""
 
     takes_gain = True
     keys = ("drive_gain",)
@@ -196,7 +196,7 @@ class _OfSpring(InputKind):
         return spring_stiffness
 
     def known_gain(self, *, windy: bool) -> KnownGain | None:
-        """The stiffness of the motion, which is the spring's where the air adds none."""
+        """The stiffness of the motion, which equals the spring's if the air adds none."""
         return None if windy else KnownGain(per_stiffness=1.0)
 
 
@@ -269,7 +269,7 @@ class BaseRotation(InputKind):
 class BaseTranslation(_OfGain):
     """The acceleration a of a base that moves across the body's arm; moment = −gain · a, with gain = mass · arm.
 
-    The arm, from the axis to the centre of mass, is assumed to be the one at rest.
+    The arm, from the axis to the centre of mass, is assumed to be the arm at rest.
     """
 
     column = "base_acceleration_m_s2"
@@ -288,7 +288,7 @@ class BaseTranslation(_OfGain):
         return accelerates and _SHAKEN.search(name) is not None
 
     def factor(self, unit: str) -> float:
-        """From a unit of length over time squared, or from g."""
+        """The factor from a unit of length over time squared, or from g."""
         return _ALONG.get(_plain(unit), 1.0)
 
 
@@ -319,4 +319,4 @@ INPUT_COLUMNS: tuple[InputColumn, ...] = tuple(INPUTS)
 WITHOUT_UNIT: Mapping[str, tuple[InputColumn, ...]] = {
     "base_acceleration": (BaseRotation.column, BaseTranslation.column)
 }
-"""Names that lack the unit which says what kind of input a column is, with the columns that they may be."""
+"""Names without the unit that would determine the kind of input, with the columns that they may mean."""

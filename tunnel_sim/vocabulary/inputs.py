@@ -14,20 +14,20 @@ from tunnel_sim.vocabulary.input_kinds import INPUT_COLUMNS, INPUTS, InputColumn
 from tunnel_sim.vocabulary.record import Array, Record
 
 Hold = Literal["zero", "linear"]
-"""Between samples the input keeps its value, or is linear."""
+"""Whether the input keeps its value between samples, or is linear."""
 
 HOLDS: tuple[Hold, ...] = ("zero", "linear")
-"""The holds by their order, 0 and 1."""
+"""The holds, by order: 0 and 1."""
 
 INPUT_KEYS = ("drive_hold", "drive_gain", "servo_kv")
 """The keys of a run that state its input."""
 
-_CONSTANT = 1e-9  # of the largest value, within which an input is constant
+_CONSTANT = 1e-9  # share of the largest value within which an input is constant
 _ITSELF = 1e-7  # share of the variance by which an input must differ from every multiple of the response
 _FLAT = 3  # equal extreme values in a row that a clipped input has
-_CLIPPED = 0.01  # share of the samples at an extreme, from which an input is clipped
-_LEVELS = 0.6  # share of the samples at both extremes, above which they are the levels of a square wave
-_NEIGHBOURS = 5.0  # samples at the extreme for each one within a hundredth of the range of it
+_CLIPPED = 0.01  # share of the samples at an extreme from which an input is clipped
+_LEVELS = 0.6  # share of the samples at both extremes above which they are the levels of a square wave
+_NEIGHBOURS = 5.0  # ratio of samples at the extreme to samples within a hundredth of the range of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,12 +35,12 @@ class Input:
     """The input of a run at the samples of its record.
 
     Args:
-        column: of a run file, which determines the kind of input (`INPUTS`).
-        values: at the times of the record, shape (n,), in the unit of the column.
-        hold: between the samples; None: not stated, and assumed linear.
-        gain: N m per unit, for kinds that take one; for ``base_acceleration_m_s2`` mass times arm, kg m. None
-            where it is not stated.
-        servo_kv: for ``command_rad``, the servo's damping against the ground, N m s/rad; None where it is not
+        column: column of a run file; it determines the kind of input (`INPUTS`).
+        values: values at the times of the record, shape (n,), in the unit of the column.
+        hold: hold between the samples; None: not stated, and assumed linear.
+        gain: N m per unit, for kinds with a gain; for ``base_acceleration_m_s2`` mass times arm, kg m. None if
+            it is not stated.
+        servo_kv: for ``command_rad``, the servo's damping against the ground, N m s/rad; None if it is not
             stated. The servo's kp is the stiffness of the run's spring.
     """
 
@@ -56,7 +56,7 @@ class Input:
 
     @property
     def stated(self) -> dict[str, float | str | None]:
-        """Its stated properties by the key of the format (`INPUT_KEYS`), in its units; None where not stated."""
+        """The stated properties by the key of the format (`INPUT_KEYS`), in its units; None: not stated."""
         return {"drive_hold": self.hold, "drive_gain": self.gain, "servo_kv": self.servo_kv}
 
     @property
@@ -81,7 +81,7 @@ class Input:
 
 
 def checked_input(drive: Input, record: Record, where: str, *, judged: bool = True) -> None:
-    """Refuse an input that cannot belong to its record; where ``judged``, also one that looks clipped."""
+    """Refuse an input that cannot belong to its record; if ``judged``, also an input that looks clipped."""
     values, name = drive.values, drive.column
     if values.shape != record.yaw_rad.shape:
         what = f"the input {name} has {values.size} samples, the record {record.yaw_rad.size}"
@@ -135,8 +135,8 @@ def refuse_untreated(
     """Refuse an input with which no driven run can be identified or diagnosed.
 
     Args:
-        spring_stiffness: as stated, N m/rad; None where it is not stated.
-        quantity: measured by the sensor.
+        spring_stiffness: stated stiffness, N m/rad; None if not stated.
+        quantity: quantity that the sensor measures.
         wind_on: whether the wind blows.
     """
     kind = drive.kind
@@ -163,7 +163,7 @@ def refuse_untreated(
 
 
 def refuse_several_gains(drives: Iterable[Input], where: str) -> None:
-    """Refuse inputs of several columns whose gains are unknown: one gain is fitted, common to the runs."""
+    """Refuse inputs of several columns with unknown gains: one gain is fitted, common to the runs."""
     columns = sorted({one.column for one in drives if one.kind.takes_gain and one.gain is None})
     if len(columns) > 1:
         raise TunnelError(
@@ -177,7 +177,7 @@ def without_spring_needs_input(spring_stiffness: float | None, drive: Input | No
     """Refuse a run with neither a spring nor an input.
 
     Args:
-        spring_stiffness: as stated, N m/rad; None where it is not stated.
+        spring_stiffness: stated stiffness, N m/rad; None if not stated.
     """
     if spring_stiffness == 0.0 and drive is None:
         raise TunnelError(

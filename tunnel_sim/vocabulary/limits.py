@@ -1,7 +1,7 @@
 """Limits on reading, expansion and simulation, each with its reason; docs/reference/limits.md lists them.
 
-Each limit is far above the records of rigs, and low enough that no input fills 2 GiB of memory or runs for hours
-unexpectedly. The simulator and the readers use the same limits, so every written file can be read.
+Each limit is far above the records of rigs, and low enough that no input fills 2 GiB of memory or runs for
+hours unexpectedly. The simulator and the readers use the same limits, so every written file can be read.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ READER_SECONDS = 20.0
 READER_PACE = 2.0**19
 """Slowest pace at which a library may read, bytes per s: workbooks, the slowest, are read at 2 MB/s."""
 READER_MEMORY = 4 * 2**30
-"""Most memory of the process in which a library reads, bytes, on Linux: the largest file fits in three times."""
+"""Maximum memory of the reading process, bytes, on Linux: enough for three times the largest file."""
 
 NESTING = 32
 """Deepest nesting of tables and lists: the formats need six levels, and Python's recursion limit is a thousand."""

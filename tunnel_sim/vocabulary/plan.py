@@ -118,9 +118,9 @@ class Condition:
         spring_stiffness: Kr, N m/rad.
         wind_speed: V, m/s; 0 is wind-off.
         air_density: ρ, kg/m³.
-        release_angle: rad, nose-right positive; 0 for a driven run, where it starts at rest.
-        duration: of the record, s.
-        gain: true gain of an input that takes one, unknown to the estimators: N m per unit.
+        release_angle: release angle, rad, nose-right positive; 0 for a driven run, which starts at rest.
+        duration: duration of the record, s.
+        gain: true gain of an input that takes a gain, unknown to the estimators: N m per unit.
     """
 
     id: str
@@ -138,10 +138,10 @@ class SensorModel:
     """The potentiometer: it adds its zero and noise to the angle, then quantises.
 
     Args:
-        sample_rate: Hz.
+        sample_rate: sample rate, Hz.
         noise_std: standard deviation of the noise, rad.
         resolution: step of the reading, rad; 0: no quantisation.
-        zero: added to the angle, rad; the same in all runs and unknown to the estimators.
+        zero: offset added to the angle, rad; the same in all runs and unknown to the estimators.
     """
 
     sample_rate: float = DEFAULT_SAMPLE_RATE
@@ -170,7 +170,7 @@ class CampaignPlan:
         conditions: the runs, at least one, with unique ids.
         effects: effects added to the nominal model.
         scatter: differences between the runs, which the campaign does not state.
-        repeatability: the campaign's statement on them.
+        repeatability: the campaign's statement on these differences.
     """
 
     name: str
@@ -201,7 +201,7 @@ def stepped_sine(time_s: Times, frequencies_hz: Sequence[float]) -> PerSample:
 
 
 def chirp(time_s: Times, start_hz: Hertz, end_hz: Hertz) -> PerSample:
-    """A sine whose frequency changes linearly with time, from the first to the last sample."""
+    """A sine with a frequency that changes linearly with time, from the first to the last sample."""
     slope = (end_hz - start_hz) / time_s[-1]
     values: Array = np.sin(2.0 * pi * (start_hz + 0.5 * slope * time_s) * time_s)
     return values
@@ -218,7 +218,7 @@ def lines_in_band(size: int, interval: float, low_hz: float, high_hz: float) -> 
 
     Args:
         size: number of samples n (a count).
-        interval: between samples, s.
+        interval: interval between samples, s.
         low_hz, high_hz: ends of the band, included, Hz.
     """
     length = size * interval
@@ -232,8 +232,8 @@ def multisine(
     """Cosines of equal amplitude at all multiples of one over the record's length within a band.
 
     Args:
-        rng: draws the phases; None: Schroeder's phases, −π k (k − 1)/N of the k-th of N lines, which keep the peak
-            low (doi:10.1109/TIT.1970.1054411).
+        rng: generator of the phases; None: Schroeder's phases, −π k (k − 1)/N of the k-th of N lines, which
+            keep the peak low (doi:10.1109/TIT.1970.1054411).
     """
     lines = lines_in_band(time_s.size, time_s[1] - time_s[0], low_hz, high_hz)
     k = np.arange(1.0, lines.size + 1.0)

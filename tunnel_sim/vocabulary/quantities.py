@@ -1,4 +1,4 @@
-"""Numbers and arrays whose type states their unit and shape, in SI units and radians.
+"""Numbers and arrays with types that state their unit and shape, in SI units and radians.
 
 In shapes, n counts samples or other values, p shared parameters and m unknowns.
 

@@ -13,8 +13,8 @@ from tunnel_sim.vocabulary.columns import read_only as read_only
 from tunnel_sim.vocabulary.columns import read_only_column
 from tunnel_sim.vocabulary.errors import TunnelError
 
-#: Deviation of the times from a uniform clock, in steps, up to which they are uniform. At ten samples per cycle it
-#: moves a reading by 0.6 % of the swing.
+#: Maximum deviation of the times from a uniform clock, in steps, for them to count as uniform. At ten samples
+#: per cycle it moves a reading by 0.6 % of the swing.
 CLOCK_TOLERANCE = 0.01
 _GAP = 4.0  # mean intervals: a longer step is a gap
 
@@ -25,11 +25,11 @@ class Record:
 
     Args:
         time_s: sample times, shape (n,), s, increasing.
-        yaw_rad: sensor reading, shape (n,), rad, nose-right positive; the sensor's zero is unknown. Where the
+        yaw_rad: sensor reading, shape (n,), rad, nose-right positive; the sensor's zero is unknown. If the
             campaign's sensor measures a rate or an acceleration, rad/s or rad/s².
 
-    Lists and columns of pandas and Polars are taken, too; dates and durations become seconds from the first sample.
-    The arrays are copied and made read-only.
+    Lists and columns of pandas and Polars are accepted, too; dates and durations become seconds from the first
+    sample. The arrays are copied and made read-only.
 
     Raises:
         TunnelError: for columns of other values, missing values, times that do not increase, and other sizes.
@@ -52,7 +52,7 @@ class Record:
             raise TunnelError(what, where=where, remedy="sort the samples, and give each time once")
 
     def __repr__(self) -> str:
-        """The samples, the range of the readings, and where to go from here, in three lines."""
+        """The samples, the range of the readings, and what to call next, in three lines."""
         kind = "evenly spaced" if self.uniform else "not evenly spaced"
         low, high = float(self.yaw_rad.min()), float(self.yaw_rad.max())
         return (
@@ -92,14 +92,14 @@ def gaps(time: Array) -> NDArray[np.bool_]:
 
 
 def evenly_spaced(record: Record, *, bridged: bool = True) -> Record:
-    """A record on a uniform raster, for methods that need one: itself where it is uniform.
+    """A record on a uniform raster, for methods that need one: itself if it is uniform.
 
     Otherwise a smooth curve through it, which bridges gaps or keeps them at the mean; neither is a measurement.
     """
     if record.uniform:
         return record
     given, reading = record.time_s, record.yaw_rad
-    # Cubic pieces whose slopes come from parabolas through three neighbours.
+    # cubic pieces with slopes from parabolas through three neighbours
     slope = np.gradient(reading, given)
     time = np.linspace(given[0], given[-1], given.size)
     at = np.clip(np.searchsorted(given, time, side="right") - 1, 0, given.size - 2)

@@ -1,4 +1,4 @@
-"""The rig: its body, its reference sizes, and a joint of the user's model: its law, and a changed attribute."""
+"""The rig: its body, its reference sizes; the joint of a user's model: its law, and a changed attribute."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class Term:
     """A part of the moment beyond a linear spring and damper: minus the coefficient times the expression.
 
     Args:
-        coefficient: in the unit.
-        unit: such that the product is in N m.
+        coefficient: coefficient, in the unit.
+        unit: unit with which the product is in N m.
     """
 
     expression: str
@@ -37,15 +37,15 @@ class Term:
 
 @dataclass(frozen=True)
 class Actuator:
-    """An actuator of a joint, whose moment is proportional to its control.
+    """An actuator of a joint with a moment proportional to its control.
 
     Args:
-        name: as in the model, or its number.
-        index: place among the model's actuators.
+        name: name in the model, or its number.
+        index: index among the model's actuators.
         gain: N m per unit of the control.
-        control: least and greatest control that are not clipped.
-        moment: least and greatest moment that are not clipped, N m.
-        servo: its moment without control at position 0, N m, and per position, N m/rad; part of the joint's law.
+        control: least and greatest unclipped control.
+        moment: least and greatest unclipped moment, N m.
+        servo: moment without control at position 0, N m, and per position, N m/rad; part of the joint's law.
     """
 
     name: str
@@ -60,8 +60,8 @@ class Actuator:
 class JointLaw:
     """The equation of motion about the joint's stable rest position.
 
-    The joint obeys I b̈ + C ḃ + K b + Σ terms + friction = 0. For a slide read metres for radians, N for N m and kg
-    for kg m².
+    The joint obeys I b̈ + C ḃ + K b + Σ terms + friction = 0. For a slide, metres replace radians, N replaces N
+    m and kg for kg m².
 
     Args:
         inertia: I, kg m².
@@ -71,8 +71,8 @@ class JointLaw:
         rest: the joint's position at rest, rad; without any restraint, the middle of its records.
         free: which of `FREE_PARAMETERS` are fitted, the ``gain`` kp of a position servo among them; without any
             restraint, ``rest`` is a constant moment.
-        actuator: its control drives the runs; None: no run is driven by a control.
-        step: of the model, s.
+        actuator: actuator with the control that drives the runs; None: no control drives any run.
+        step: time step of the model, s.
         lead: time by which the motion leads its input in first-order integrators, s.
     """
 
@@ -112,14 +112,14 @@ class JointLaw:
         return found
 
 
-_SLANT_DROP = 0.4  # height of the slant over that of the body: the paper gives its angle, not its length
+_SLANT_DROP = 0.4  # height of the slant over the body's: the paper gives its angle, not its length
 _NOSE_RADIUS = 0.30  # share of the height, for drawing only
-_EDGE_RADIUS = 0.14  # of the long edges, share of the height, for drawing only
+_EDGE_RADIUS = 0.14  # radius of the long edges, share of the height, for drawing only
 _STEPS = 8  # facets of a quarter round
 
 
 def davis_vertices(body: Body) -> Array:
-    """Vertices whose convex hull is the body about its middle, shape (n, 3), m: forward, to the left, up."""
+    """Vertices with the body about its middle as their convex hull, shape (n, 3), m: forward, to the left, up."""
     nose, tail = body.length / 2, -body.length / 2
     top, bottom = body.height / 2, -body.height / 2
     drop = _SLANT_DROP * body.height if body.rear_slant_deg > 0 else 0.0
@@ -147,7 +147,7 @@ class WrittenAttribute:
     """An attribute of a user's model that a patch changed, in SI units.
 
     Args:
-        name: its element and name.
+        name: element and name.
         before: values in the given model, in ``unit``.
         after: values in the patched one, in ``unit``.
     """
@@ -179,7 +179,7 @@ class Body:
         length: reference length l, m.
         width, height, ground_clearance: m.
         rear_slant_deg: angle of the rear slant below the roof, degrees.
-        mass: of model and oscillating mechanism, kg.
+        mass: mass of model and oscillating mechanism, kg.
         frontal_area, side_area: A, and the area of the side, m².
     """
 
@@ -231,7 +231,7 @@ class Dynamics:
 
 @dataclass(frozen=True)
 class Air:
-    """The air in the tunnel, of density ρ, kg/m³."""
+    """The air in the tunnel: its density ρ, kg/m³."""
 
     density: float
 
@@ -278,7 +278,7 @@ class Rig:
         """The stiffness of a numbered spring.
 
         Args:
-            number: as in Table II.
+            number: spring number, as in Table II.
 
         Returns:
             Kr, N m/rad.

@@ -1,4 +1,4 @@
-"""The runs of a campaign by what they have: an input, the wind."""
+"""The runs of a campaign by input and wind."""
 
 from __future__ import annotations
 

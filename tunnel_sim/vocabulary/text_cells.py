@@ -11,7 +11,7 @@ _NUMBER = re.compile(  # such as -0.103(12), -0.10 ± 0.02, -40 % and -3 deg
 
 
 def as_text_cell(text: str) -> str:
-    """A text after an apostrophe where a spreadsheet would treat it as a formula; numbers are unchanged."""
+    """A text after an apostrophe if a spreadsheet would treat it as a formula; numbers are unchanged."""
     return f"'{text}" if _FORMULA.match(text) and not _NUMBER.fullmatch(text) else text
 
 

@@ -11,9 +11,9 @@ from tunnel_sim.vocabulary.quantities import Angles, PerSample, Times
 from tunnel_sim.vocabulary.record import Array
 
 LEAST = 6
-"""Turning points from which a period, a decrement and the scatter about both can be told."""
-_GROWS = 1.25  # of the previous swing: upper bound of the next one in a decay read by hand
-_SHRINKS = 0.4  # of the previous swing: an oscillating decay from one side to the other is no faster
+"""Minimum number of turning points that determine a period, a decrement and the scatter about both."""
+_GROWS = 1.25  # multiple of the previous swing: upper bound of the next swing in a decay read by hand
+_SHRINKS = 0.4  # share of the previous swing: an oscillating decay from one side to the other is not faster
 _MISSED = 0.35  # of half a period: times of turning points are as close to whole numbers of it
 
 

@@ -1,7 +1,7 @@
 """An entry that learns: `python learned.py TRAINING CAMPAIGNS ANSWERS`. It does not depend on this project.
 
-TRAINING is a set of another seed, with its key. A campaign gets the causes of its nearest neighbours there, by
-frequency and amplitude along the runs. Put another learner in place of `neighbours`.
+TRAINING is a set of campaigns from another seed, with its key. A campaign gets the causes of its nearest neighbours
+there, by frequency and amplitude along the runs. Put another learner in place of `neighbours`.
 """
 
 import json

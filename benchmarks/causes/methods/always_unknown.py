@@ -16,7 +16,7 @@ def answer(folder: Path) -> dict[str, Any]:  # noqa: ARG001 — the signature of
     """The same answer to every campaign.
 
     Args:
-        folder: of the campaign; it is not read.
+        folder: folder of the campaign; it is not read.
     """
     return answer_of([UNKNOWN], {**dict.fromkeys(NAMES, 0.05), UNKNOWN: 0.5})
 

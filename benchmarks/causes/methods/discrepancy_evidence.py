@@ -18,7 +18,7 @@ from benchmarks.causes.discrepancy import ETA, Discrepancy, ErrorEvidence, linea
 from benchmarks.causes.entry import UNKNOWN, About, answer_of, main
 
 SCALE, ODDS, LEFT = 0.05, 0.1, 0.2
-RANDOM_NUMBERS = 9.0  # nats, for the three numbers of a random moment
+RANDOM_NUMBERS = 9.0  # price in nats for the three numbers of a random moment
 ABOUT = About(
     "discrepancy evidence",
     f"on all sets that `tunnel diagnose` fits, with its test of the gap; half-Cauchy η of scale {SCALE:g} of the "
@@ -33,7 +33,7 @@ def answer(folder: Path) -> dict[str, Any]:
     """Answer one campaign.
 
     Args:
-        folder: of the campaign.
+        folder: folder of the campaign.
     """
     from benchmarks.causes.fits import grown
 
@@ -74,7 +74,7 @@ def weigh(
     Args:
         nominal: evidence of the nominal model.
         sets: evidence by names of the causes.
-        random: by names of the causes, for sets with a random moment: the evidence of the other causes, and the
+        random: for sets with a random moment, by names of the causes: the evidence of the other causes, and the
             decrease of −2 ln L by the moment.
     """
     hyper = np.log(ETA) - np.log1p((ETA / SCALE) ** 2)  # density of log η

@@ -23,7 +23,7 @@ def answer(folder: Path) -> dict[str, Any]:
     """Answer one campaign.
 
     Args:
-        folder: of the campaign.
+        folder: folder of the campaign.
     """
     from benchmarks.causes.fits import candidates, nominal
 

@@ -38,7 +38,7 @@ def answer(folder: Path) -> dict[str, Any]:
     """Answer one campaign.
 
     Args:
-        folder: of the campaign.
+        folder: folder of the campaign.
     """
     where = equations(folder)
     data = Regression.of(where)
@@ -75,7 +75,7 @@ def exhaustive(data: Regression, names: Sequence[str], third: NDArray[np.int64])
 
     Args:
         data: the regression.
-        names: of the candidates.
+        names: names of the candidates.
         third: number of each row's third, shape (rows,).
     """
     fit, held = third == 0, third == 1
@@ -111,7 +111,7 @@ def f_test(data: Regression, chosen: Sequence[str], name: str, rows: Array) -> f
         data: the regression.
         chosen: names of the terms.
         name: of the tested term.
-        rows: selection of the rows, shape (rows,).
+        rows: mask of the rows, shape (rows,).
     """
     others = [n for n in chosen if n != name]
     target = data.target[rows]

@@ -31,7 +31,7 @@ def answer(folder: Path) -> dict[str, Any]:
     """Answer one campaign.
 
     Args:
-        folder: of the campaign.
+        folder: folder of the campaign.
     """
     rig = ToolboxRig(folder)
     start = rig.fit((), NOMINAL, np.zeros(len(NOMINAL) + 2 * len(rig.trials)))
@@ -63,7 +63,7 @@ def ranked(rig: ToolboxRig, best: ToolboxFit) -> list[tuple[tuple[str, ...], tup
 
     Args:
         rig: the campaign.
-        best: the fit to add a cause to.
+        best: fit to which a cause is added.
     """
     found = []
     size = len(best.names)
@@ -91,7 +91,7 @@ def coefficients(rig: ToolboxRig, fit: ToolboxFit) -> dict[str, dict[str, float]
 
     Args:
         rig: the campaign.
-        fit: of it.
+        fit: fit of the campaign.
     """
     from mujoco import sysid
 

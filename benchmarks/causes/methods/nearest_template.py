@@ -38,7 +38,7 @@ def answer(folder: Path) -> dict[str, Any]:
     """Answer one campaign.
 
     Args:
-        folder: of the campaign.
+        folder: folder of the campaign.
     """
     measured, weight, nominal, templates = backbones(read_campaign(folder))
     basis = np.linalg.qr(nominal * weight[:, None])[0]

@@ -26,7 +26,7 @@ def answer(folder: Path) -> dict[str, Any]:
     """Answer one campaign.
 
     Args:
-        folder: of the campaign.
+        folder: folder of the campaign.
     """
     from benchmarks.causes.summaries import summaries
     from tunnel_sim.files.campaign_folder import read_campaign

@@ -17,7 +17,7 @@ def answer(folder: Path) -> dict[str, Any]:
     """Diagnose one campaign.
 
     Args:
-        folder: of the campaign.
+        folder: folder of the campaign.
     """
     from diagnosis import diagnose
 

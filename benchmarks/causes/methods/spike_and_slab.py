@@ -30,7 +30,7 @@ def answer(folder: Path) -> dict[str, Any]:
     """Answer one campaign.
 
     Args:
-        folder: of the campaign.
+        folder: folder of the campaign.
     """
     data = Regression.of(equations(folder))
     names = list(data.causes)

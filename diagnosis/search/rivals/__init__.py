@@ -1,4 +1,4 @@
-"""The causes from outside the vocabulary that are weighed with it, one file each."""
+"""Causes from outside the vocabulary, weighed together with its effects, one file each."""
 
 from __future__ import annotations
 
@@ -7,5 +7,5 @@ from diagnosis.search.rivals.rival import Rival
 from diagnosis.search.rivals.second_inertia import TwoInertias
 from diagnosis.search.rivals.two_springs import TwoSprings
 
-#: Weighed where a diagnosis is not given others.
+#: The rivals of a diagnosis, unless others are given.
 RIVALS: tuple[Rival, ...] = (TwoSprings(), TwoInertias(), InertiaBySpring())

@@ -1,4 +1,4 @@
-"""A rival: a cause from outside the vocabulary that is weighed with its sets. Your own rival is one file."""
+"""A rival: a cause from outside the vocabulary, weighed with the sets of effects. Your own rival is one file."""
 
 from __future__ import annotations
 
@@ -33,17 +33,17 @@ class Rival:
             nominal: the nominal model, fitted to the same runs.
 
         Returns:
-            Each with its own names, which no set of the vocabulary has; none where the rival does not apply.
+            Each with names that no set of the vocabulary has; empty where the rival does not apply.
         """
         raise NotImplementedError
 
     def fact(self, best: Hypothesis, similarity: Similarity) -> Fact | None:
-        """The fact stated where it would explain a gap of unknown cause; None: nothing.
+        """The fact to state if the rival would explain a gap of unknown cause; None: nothing.
 
-        Your own sentence is a `diagnosis.model.fact.as_stated`.
+        Return your own sentence by `diagnosis.model.fact.as_stated`.
 
         Args:
-            best: the likeliest of its hypotheses.
+            best: the most likely of the rival's hypotheses.
             similarity: the conversion from the measured campaign.
         """
         del best, similarity

@@ -1,9 +1,9 @@
 """A cause from outside the vocabulary: a second inertia behind a spring, between the motor of a joint and its link.
 
-The motor turns one inertia, which turns the other by a spring. Read at the motor, the angle has an antiresonance,
-at which the link alone swings on the spring, and above it a resonance; their ratio gives the ratio of the inertias.
-Read at the link, it has the resonance alone, at which its phase falls by half a turn. The moments of the mechanism,
-such as friction, act at the end with the sensor.
+The motor turns one inertia, which turns the other through a spring. The angle at the motor has an
+antiresonance, at which only the link swings on the spring, and above it a resonance; their ratio gives the
+ratio of the inertias. The angle at the link has only the resonance, at which its phase falls by half a turn.
+The moments of the mechanism, such as friction, act at the end with the sensor.
 """
 
 from __future__ import annotations
@@ -33,27 +33,27 @@ from tunnel_sim.physics.run_settings import RodTwist, SettingsTable
 from tunnel_sim.vocabulary.record import Array
 
 SECOND_INERTIA_RATE: Final = 1e-3
-"""Rate at which chance alone makes a second inertia explain more than every set of effects. Convention."""
+"""False-alarm rate at which a second inertia explains more than every set of effects by chance. Convention."""
 SECOND_INERTIA_BESIDE: Final = 2
-"""Number of sets of effects beside which a second inertia is tried, beside the nominal model. Judgement. Time
+"""Number of sets of effects combined with a second inertia, beside the nominal model. Judgement. Time
 against coverage."""
 PARTNER_LEAVES: Final = 0.5
-"""Maximum χ² beside an effect, over that of a second inertia alone, for an effect to be stated with it. Judgement.
-The law has the damping at one end, and an effect may make up for that."""
+"""Maximum χ² with an effect over χ² of a second inertia alone, for the effect to be stated with it. Judgement.
+The law has the damping at one end only, and an effect may compensate for that."""
 RESONANCE_DRIVEN: Final = 0.05
-"""Minimum amplitude of the input about a resonance, over its greatest, for the resonance to be stated. Judgement.
-Beyond the input's band a delay or a filter looks like a resonance far above it."""
+"""Minimum amplitude of the input near a resonance, over its greatest, for the resonance to be stated.
+Judgement. Beyond the input's band a delay or a filter looks like a distant resonance."""
 
-_FRACTION = 0.08  # of the frequency: from one tried to the next
-_CYCLES = 4.0  # of the lowest frequency tried, in the shortest run
-_HIGHEST = 0.6  # of the frequencies that the samples resolve
-_SHARP = 0.03  # damping ratio of the resonances tried
-_STARTS = 3  # resonances of the scan from which fits start
-_FIRST = 6  # iterations, after which the best fit alone continues
-_BAND = 0.1  # of a resonance's frequency, on either side
-_LEAST_RATIO = 0.1  # of the inertias, or its inverse, at a start
+_FRACTION = 0.08  # relative step from one tried frequency to the next
+_CYCLES = 4.0  # cycles of the lowest tried frequency in the shortest run
+_HIGHEST = 0.6  # highest tried frequency, as a share of the Nyquist frequency
+_SHARP = 0.03  # damping ratio of the tried resonances
+_STARTS = 3  # number of resonances of the scan at which fits start
+_FIRST = 6  # number of iterations after which only the best fit continues
+_BAND = 0.1  # share of a resonance's frequency, on either side
+_LEAST_RATIO = 0.1  # ratio of the inertias, or its inverse, at a start
 _EVEN = 1.0  # ratio of inertias where the reading does not show it
-_MOST_DAMPED = 0.2  # damping ratio: a resonance of more is a filter or a lag
+_MOST_DAMPED = 0.2  # maximum damping ratio of a resonance; with more it is a filter or a lag
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class SecondInertia(Effect):
     driven = True
     by_angle_in_room = True
 
-    #: Whether the motor turns the inertia that carries the sensor; else the other one.
+    #: Whether the motor turns the inertia that carries the sensor; else it turns the other one.
     at_motor: ClassVar[bool]
 
     resonance: float = parameter(
@@ -87,7 +87,7 @@ class SecondInertia(Effect):
     def on_runs(
         cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Self], drawn: Sequence[Drawn]
     ) -> None:
-        """Let the spring twist; a motor at the sensor turns that end."""
+        """Let the spring twist; if the motor is at the sensor, its input acts at that end."""
         del stated, drawn
         inertias = runs["yaw_inertia"].tolist()
         for place, (effect, inertia) in enumerate(zip(effects, inertias, strict=True)):
@@ -115,7 +115,7 @@ class LinkBehindSpring(SecondInertia):
 
     @property
     def behind(self) -> float:
-        """The ratio."""
+        """The ratio, as fitted."""
         return self.ratio
 
 
@@ -138,7 +138,7 @@ class TwoInertias(Rival):
     ) -> list[Hypothesis]:
         """The joint of two inertias, read at the motor and at the link.
 
-        None where a set of effects explains the readings as well, or down to their noise: it has a name.
+        None where a set of effects explains the readings as well, or down to the noise: the set has a name.
         """
         del likely
         inputs = nominal.problem.data.inputs
@@ -164,7 +164,8 @@ class TwoInertias(Rival):
         places = [fit.problem.names.index(name) for name in names]
         covariance = (1.0 + max(fit.excess, 0.0)) * fit.stated_covariance[np.ix_(places, places)]
         ratio = fit.value(names[-1]) if kind.at_motor else _EVEN
-        # the unexplained share of the twist's amplitude may shift a resonance by as large a share of its half-width
+        # the unexplained share of the twist's amplitude may shift a resonance by the same share of its
+        # half-width
         left = sqrt(max(fit.excess, 0.0) * fit.count / _power(fit, best.names, kind)) * fit.value(names[1])
         shift = hypot(left, _by_damping(fit, omega, ratio))
 
@@ -188,25 +189,25 @@ class TwoInertias(Rival):
 
 
 def _bearable(problem: Problem) -> bool:
-    """Whether the engine integrates the effects of a set beside a second inertia."""
+    """Whether the engine can integrate the effects of a set together with a second inertia."""
     return all(kind.autonomous and not kind.on_spring for kind in problem.effects) and not problem.free_forms
 
 
 def _explains_more(fitted: Fit, least: float) -> bool:
-    """Whether a fit lowers χ² below the least of all sets by more than chance, whatever both leave."""
+    """Whether a fit lowers χ² below the least of all sets by more than chance, however large both are."""
     drop = (least - fitted.total) / (1.0 + max(fitted.excess, 0.0))
     return drop > float(chdtri(len(fitted.problem.names), SECOND_INERTIA_RATE))
 
 
 def _adds(one: Hypothesis, other: Hypothesis) -> bool:
-    """Whether a set has an effect more than another one for a reason: it leaves much less, and not by chance."""
+    """Whether a set has a justified effect more than another: its residual is much smaller, and not by chance."""
     larger = set(one.effects) > set(other.effects)
     much = one.fit.total < PARTNER_LEAVES * other.fit.total
     return not larger or (much and _explains_more(one.fit, other.fit.total))
 
 
 def _beside(base: Hypothesis) -> Iterator[Hypothesis]:
-    """The best fits of a second inertia beside the effects of a set, read at either end, where they are better."""
+    """The best fits of a second inertia with the effects of a set, read at either end, where they are better."""
     resonances = _resonances(base.fit)
     for kind in KINDS:
         problem = replace(base.fit.problem, effects=(*base.fit.problem.effects, kind))
@@ -218,11 +219,11 @@ def _beside(base: Hypothesis) -> Iterator[Hypothesis]:
 
 
 def _resonances(base: Fit) -> list[tuple[float, float]]:
-    """The resonances that explain most of the residual, if added to the motion of one inertia.
+    """The resonances that explain most of the residual if added to the motion of one inertia.
 
     Returns:
-        Angular frequencies, rad/s, and the moment's coefficient A of each, rad/(N m): A q is added to the angle,
-        q̈ + 2 ζ ω q̇ + ω² q = ω² M.
+        Angular frequencies, rad/s, and for each the coefficient A of the moment M, rad/(N m): q is added to the
+        angle, q̈ + 2 ζ ω q̇ + ω² q = A ω² M.
     """
     runs, drops = base.problem.data.runs, list[tuple[float, float, float]]()
     moments = [
@@ -253,7 +254,7 @@ def _resonances(base: Fit) -> list[tuple[float, float]]:
 
 
 def _start(base: Fit, kind: type[SecondInertia], omega: float, size: float) -> Point:
-    """Where a fit starts: at the motor A ω² J is the ratio of the inertias, at the link −1."""
+    """Start of a fit: at the motor A ω² J is the ratio of the inertias, at the link −1."""
     ratio = size * omega**2 * float(np.median(base.linear[:, 0]))
     within = float(np.clip(ratio, _LEAST_RATIO, 1.0 / _LEAST_RATIO))
     start = {"resonance": omega, "damping_ratio": _SHARP, "ratio": within}
@@ -262,10 +263,10 @@ def _start(base: Fit, kind: type[SecondInertia], omega: float, size: float) -> P
 
 
 def _by_damping(fitted: Fit, omega: float, ratio: float) -> float:
-    """The shift of a resonance, as a share, where the damping of the mechanism acts on the other inertia.
+    """The shift of a resonance, as a share, if the damping of the mechanism acts on the other inertia.
 
-    The law has it at the sensor. In a resonance of damping ratio C/(2 J ω), with the reduced inertia J, it changes
-    the frequency by half the square at most.
+    The law has the damping at the sensor's end. In a resonance with damping ratio C/(2 J ω), where J is the
+    reduced inertia, moving the damping changes the frequency by half the ratio's square at most.
     """
     inertia, damping, _ = np.median(fitted.linear, axis=0).tolist()
     reduced = inertia * ratio / (1.0 + ratio) ** 2

@@ -1,9 +1,9 @@
 """A cause from outside the vocabulary: two springs that are not as stiff as stated.
 
-Every effect that changes the frequency with the spring has one parameter for it, and the inertia is another, so
-two such effects fit any frequencies of three springs. Two springs off are as simple (paper, Table II: springs 4
-and 7), and are not an effect of the vocabulary. They are weighed like a set of it; their probability is added to
-the probability of an unknown cause.
+Every effect that changes the frequency with the spring has one parameter for it, and the inertia is another.
+Two such effects therefore fit any frequencies of three springs. Two wrong springs are as simple (paper, Table
+II: springs 4 and 7), and are not an effect of the vocabulary. They are weighed like a set of effects; their
+probability is added to the probability of an unknown cause.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class SpringError:
         stiffness: as stated, N m/rad.
         error: relative error of the stiffness, a fraction.
         std: standard deviation of the error, a fraction.
-        probability: among the springs that may be off, a fraction; None for one of several that are all off.
+        probability: among the possible springs, a fraction; None if several springs are off together.
     """
 
     stiffness: float
@@ -55,14 +55,14 @@ class AnotherSpring(ONE_SPRING):  # type: ignore[valid-type, misc]
 
 
 class TwoSprings(Rival):
-    """Two springs off, in place of the effects of answers that change the frequency with the spring."""
+    """Two springs off, replacing the effects of an answer that change the frequency with the spring."""
 
     def hypotheses(
         self, likely: Sequence[Hypothesis], known: Sequence[Hypothesis], nominal: Fit
     ) -> list[Hypothesis]:
-        """The pairs of springs with the other effects of each answer; none with too few springs.
+        """Pairs of springs with the other effects of each answer; none with too few springs.
 
-        Fits start at the known sets with those effects.
+        Fits start at the known sets with the same effects.
         """
         data = nominal.problem.data
         if len(data.springs) < TWO_SPRINGS_OF:
@@ -94,7 +94,7 @@ class TwoSprings(Rival):
 
 
 def spring_error(fit: Fit, name: str, similarity: Similarity) -> SpringError:
-    """The spring that an effect is off, and its error."""
+    """The spring of a spring effect, and its error."""
     stated = dict(fit.problem.fixed)[f"{name}.{ONE_SPRING.chosen_spring()}"]
     inflate = float(np.sqrt(1.0 + max(fit.excess, 0.0)))
     error, std = (of(f"{name}.error") for of in (fit.value, fit.std))

@@ -8,5 +8,5 @@ from diagnosis.search.views.stretches import InStretches
 from diagnosis.search.views.view import View
 from diagnosis.search.views.whole_runs import WholeRuns
 
-#: In order of preference; each gets the results of the one before.
+#: In order of preference; each view gets the results of the previous one.
 VIEWS: tuple[type[View], ...] = (InStretches, Beginnings, AfterBeginnings, WholeRuns, ByMoment)

@@ -1,6 +1,6 @@
 """Sets of causes of runs with a long input: found in the beginnings of the runs, then compared in whole runs.
 
-An input keeps a body in motion, so that the beginning of a run shows what the whole run shows. A free decay has its
+An input keeps a body in motion, so the beginning of a run shows as much as the whole run. A free decay has its
 large swings at its beginning and its small ones at its end.
 """
 
@@ -33,9 +33,9 @@ _LEAST = 8  # cycles in a beginning: a body with a damping ratio of 0.02 remembe
 
 
 def common_length(data: Data) -> int:
-    """The greatest length of driven runs, in blocks, with which all runs have as many readings as chosen.
+    """The greatest length of driven runs, in blocks, that keeps all readings within the chosen number.
 
-    Shorter runs and free decays stay whole. 0 where these alone have more.
+    Shorter runs and free decays stay whole. 0 where these alone have more readings.
     """
     free = sum(run.reading.size for run in data.decays)
     left, length = max(data.settings.search.begun_on - free, 0), 0
@@ -79,12 +79,12 @@ class Beginnings(WholeRuns):
     def holds(self, answer: Hypothesis | None, settled: Hypothesis | None) -> bool:
         """Whether the answer is a set that explains whole runs as well as their beginnings.
 
-        If not, an effect that acts later on could pay its price. Chance differences between the runs imitate an
-        effect that seldom acts, so that whole runs decide between the two.
+        If it does not, an effect that acts later could pay its price. Chance differences between the runs
+        imitate an effect that seldom acts, so whole runs must decide between the two.
 
         Args:
             answer: fitted to the beginnings; None: the answer is not a fitted set.
-            settled: the same, fitted to whole runs.
+            settled: the same answer, fitted to whole runs.
         """
         weighing = self.base.settings.weighing
 
@@ -100,7 +100,7 @@ class Beginnings(WholeRuns):
     def whole(self, hypothesis: Hypothesis) -> Hypothesis | None:
         """The set fitted to whole runs, with the forms that the beginnings free, if any.
 
-        An effect with instants of its own is sought there again, since it may act at later ones, too.
+        Whole runs are searched again for an effect with instants, because it may act later, too.
         """
         sought = [kind for kind in hypothesis.fit.problem.effects if issubclass(kind, Clock)]
         kept = [name for name in hypothesis.effects if all(kind.name != name for kind in sought)]
@@ -113,9 +113,10 @@ class Beginnings(WholeRuns):
         return replace(found[0], plain=found[0].fit) if found else None
 
     def settled(self, hypothesis: Hypothesis) -> Hypothesis | None:
-        """The set fitted to whole runs, with its forms of the beginnings and in the deepest minimum of these.
+        """The set fitted to whole runs, with the forms and the deepest minimum found in the beginnings.
 
-        The covariance of other minima comes from the beginnings, too. Whole runs exclude more of them.
+        The covariance of other minima is also from the beginnings, although whole runs would exclude more of
+        them.
         """
         begun = polish(hypothesis)
         whole, spread = self.whole(begun), begun.fit.spread
@@ -142,7 +143,7 @@ class AfterBeginnings(View):
 
     @classmethod
     def after(cls, prepared: Prepared, known: Sets | None, clock: StepClock) -> Self | None:
-        """The view after the beginnings, where their answer holds in whole runs."""
+        """The view after the beginnings, if their answer holds in whole runs."""
         del prepared, clock
         if known is None or not isinstance(known.view, Beginnings):
             return None

@@ -23,9 +23,9 @@ from diagnosis.search.views.view import View
 MOMENT_NOISE_FROM: Final = 0.05
 """Minimum probability of a set for its residual random moment to be modelled as noise. Judgement."""
 MOMENT_LEFT: Final = 0.25
-"""Maximum power of the residual random moment of a set, as a share of the missing moment, for a body without
-a spring. Judgement. Half its size: a cause explains most of the gap. The EMPS axis (0.115) is not an
-independent test."""
+"""Maximum power of a set's residual random moment, as a share of the missing moment, for a body without a
+spring. Judgement. Half its size: a cause explains most of the gap. The EMPS axis (0.115) is not an independent
+test."""
 MOMENT_CHANCE: Final = 1.0
 """Maximum relative standard deviation of the best set's residual for sets to be compared by the moment.
 Convention. The standard deviation then equals the residual."""
@@ -36,11 +36,11 @@ _POWERS = np.geomspace(1e-12, 1e12, 49)
 
 @dataclass(frozen=True, eq=False)
 class ByMoment(View):
-    """Whole runs whose noise includes a random moment.
+    """Whole runs in noise that includes a random moment.
 
-    Every small error of the moment displaces such a body permanently, so its angle departs ever further. The
-    residual random moment therefore counts as noise: the moment of the likeliest set that is small beside the
-    moment missing from the nominal model.
+    Every small error of the moment displaces such a body permanently, so its angle drifts ever further away.
+    The residual random moment therefore counts as noise: it is the residual moment of the most likely set, if
+    this is small beside the moment missing from the nominal model.
 
     Args:
         known: the sets found by the angle.
@@ -53,9 +53,9 @@ class ByMoment(View):
 
     @classmethod
     def after(cls, prepared: Prepared, known: Sets | None, clock: StepClock) -> Self | None:
-        """The view of a body without a restoring moment, where a set's share of the angle exceeds chance.
+        """The view of a body without a restoring moment, if a set's share of the angle exceeds chance.
 
-        None also where no set explains the angle, and none leaves a small moment.
+        Also None if no set explains the angle and no set leaves a small moment.
         """
         del clock
         best = None if known is None or prepared.nominal.problem.data.model.restored else known.best
@@ -76,7 +76,7 @@ class ByMoment(View):
         return cls(prepared, (small or bases)[0], known)
 
     def sets(self, clock: StepClock) -> Sets:
-        """The sets found here, beside the sets from the angle, which are not grown again."""
+        """The sets found here, with the sets from the angle, which are not grown again."""
         return replace(super().sets(clock), random=self.known.random, refused=self.known.refused)
 
     def whole(self, hypothesis: Hypothesis) -> Hypothesis | None:
@@ -87,14 +87,14 @@ class ByMoment(View):
 
 
 def by_moment(fit: Fit) -> Data:
-    """The runs of a fit, whose noise includes a random moment beside the white noise.
+    """The runs of a fit, in noise that includes a random moment beside the white noise.
 
-    Per interval, a body without a spring turns a random moment into 1/((1 − B)(1 − φ B)) of it, with the backward
-    shift B and φ = exp(−C h/Izz). White noise beside it makes (1 − B)(1 − φ B) of the reading a moving average of
-    order two, whose inverse whitens it (Box and Jenkins, Time Series Analysis). The power of the moment is the
-    likeliest one for the fit's residuals.
+    Per interval, a body without a spring turns a random moment into 1/((1 − B)(1 − φ B)) times the moment, with
+    the backward shift B and φ = exp(−C h/Izz). With white noise added, (1 − B)(1 − φ B) times the reading is a
+    moving average of order two; its inverse whitens it (Box and Jenkins, Time Series Analysis). The power of
+    the moment is the most likely one for the fit's residuals.
     """
-    from scipy.signal import lfilter  # only here: slow to load
+    from scipy.signal import lfilter  # imported here because it is slow to load
 
     inertia, damping, _ = linear_coefficients(fit, 0)
     runs = []
@@ -103,11 +103,12 @@ def by_moment(fit: Fit) -> Data:
         left = np.convolve(residual, shape, "valid")
         likeliest, least = run, np.inf
         for power in _POWERS:
-            # the invertible factor of a spectrum: of the shape's, and a constant beside it
+            # the invertible factor of a spectrum: the spectrum of the shape, plus a constant
             roots = np.roots(np.polyadd(np.convolve(shape, shape[::-1]), [power, 0.0, 0.0]))
             inside = roots[np.argsort(np.abs(roots))][:2]
             average = np.asarray(np.real(np.poly(inside)), np.float64)
-            variance = shape[2] / average[2]  # of the innovations: the products' last coefficients are equal
+            # scale of the innovations: the products' last coefficients are equal
+            variance = shape[2] / average[2]
             cost = float(np.mean(lfilter([1.0], average, left) ** 2) / variance + np.log(variance))
             if cost < least:
                 noise = NoiseWithMoment(run.noise.variance * variance, run.noise, shape, average)

@@ -1,8 +1,8 @@
 """Sets of causes fitted in stretches of the runs, where the nominal model misses the motion itself.
 
 Where the model is far from the motion, its phase is lost within a few cycles, and χ² of a whole run has many
-minima. In a stretch of two cycles the phase cannot be lost: model errors show as a frequency and a damping that
-differ from stretch to stretch (multiple shooting; Bock, Springer Ser. Chem. Phys. 18 (1981) 102).
+minima. In a stretch of two cycles the phase cannot be lost: there, a model error changes the frequency and the
+damping from stretch to stretch (multiple shooting; Bock, Springer Ser. Chem. Phys. 18 (1981) 102).
 """
 
 from __future__ import annotations
@@ -36,17 +36,17 @@ FITTED_LONGER: Final = 4
 """Number of sets of each size that are found on short stretches and fitted to long ones. Judgement. Time
 against coverage."""
 
-_SHORT, _LONG = 2, 18  # cycles
+_SHORT, _LONG = 2, 18  # number of cycles
 _LONGER = 3  # ratio of the lengths of successive fits: the phase at the end of a stretch is known well enough
-_TOLERANCE = 1e-3  # of the intermediate fits
+_TOLERANCE = 1e-3  # tolerance of the intermediate fits
 _ITERATIONS = 15
 
 
 def long_stretch(short: Stretches) -> int:
-    """Length, in blocks, of the stretches on which sets of causes are compared, from stretches of two cycles.
+    """Length, in blocks, of the stretches on which sets of causes are compared, given stretches of two cycles.
 
-    Over eighteen cycles the phase shows the model of the motion; over a hundred it also shows the clock, the
-    temperature and the release by hand.
+    Eighteen cycles are long enough for the phase to test the model of the motion. A hundred would also show the
+    clock, the temperature and the release by hand.
     """
     return short.length * _LONG // _SHORT
 
@@ -58,7 +58,8 @@ class Stretches:
     Args:
         data: the stretches, as runs.
         places: run number and first block of each stretch.
-        length: in blocks; the last stretch of a run may be half as short or half as long again.
+        length: length in blocks; the last stretch of a run may be between half and one and a half times as
+            long.
     """
 
     data: Data
@@ -75,10 +76,10 @@ class Stretches:
 
 
 def in_stretches(data: Data, length: int | None = None) -> Stretches:
-    """Cut runs into stretches, which may be fitted with effects that are autonomous.
+    """Cut runs into stretches for fits with autonomous effects.
 
     Args:
-        length: of a stretch, in blocks; two cycles where not given. Multiples of it have ends in common.
+        length: length of a stretch, in blocks; default: two cycles. Stretches of a multiple of it share ends.
     """
     if length is None:
         length = round(_SHORT / (REFERENCE_FREQUENCY * data.runs[0].interval))
@@ -94,11 +95,11 @@ def in_stretches(data: Data, length: int | None = None) -> Stretches:
 
 
 def spread_out(short: Stretches, data: Data) -> Stretches:
-    """Stretches of two cycles to grow sets of causes on, spread over the runs where there are too many.
+    """Stretches of two cycles on which sets of causes grow, spread over the runs where there are too many.
 
     Returns:
-        The stretches within every k-th stretch of eighteen cycles, the first of each run among them. k is the
-        least that keeps the number of blocks within the limit for growth.
+        The stretches within every k-th stretch of eighteen cycles, including the first of each run. k is the
+        least number that keeps the blocks within the limit for growth.
     """
     each = ceil(sum(run.reading.size for run in data.runs) / data.settings.search.grown_on)
     long = in_stretches(data, long_stretch(short))
@@ -117,11 +118,12 @@ def fit_longer(
     """Fit ever longer stretches, each from the fit of shorter ones.
 
     Args:
-        found: a fit of the stretches, the first of each run among them.
-        length: to reach, in blocks; None: whole runs.
+        found: a fit of the stretches, including the first of each run.
+        length: target length, in blocks; None: whole runs.
 
     Returns:
-        The fit of the longest stretches, and these. Whole runs are one stretch each and keep their own names.
+        The fit of the longest stretches, and these stretches. Whole runs are one stretch each and keep their
+        names.
 
     Raises:
         FitError: when the model cannot be integrated.
@@ -148,13 +150,13 @@ def fit_longer(
 class InStretches(View):
     """Long stretches of the runs, on which sets are compared, and short ones, on which they grow.
 
-    Effects are added in short stretches, in which the phase cannot be lost, and in long ones to the sets that keep
-    the phase there: a slow loss hardly shows in two cycles.
+    Effects are added on short stretches, in which the phase cannot be lost. The sets that keep the phase on
+    long stretches are extended there, because a slow loss of phase hardly shows in two cycles.
 
     Args:
         first: fit of the nominal model to the short stretches.
         short: the short stretches.
-        long: the long ones.
+        long: the long stretches.
     """
 
     first: Fit
@@ -178,7 +180,7 @@ class InStretches(View):
         first = fit_nominal(short.data)
         try:
             base, long = fit_longer(first, short, data, long_stretch(short))
-        except (FitError, np.linalg.LinAlgError):  # a model without the causes may diverge in long stretches
+        except (FitError, np.linalg.LinAlgError):  # a model without the causes may diverge on long stretches
             base, long = first, short
         return cls(prepared, base, first, short, long)
 
@@ -193,7 +195,7 @@ class InStretches(View):
         return Hypothesis((), self.base, short=Hypothesis((), self.first))
 
     def larger(self, level: Sequence[Hypothesis], progress: Progress | None) -> list[Hypothesis]:
-        """The sets with one effect more, from the better of two starts where there are two."""
+        """The sets with one effect more, from the better of two starts if there are two."""
         data = self.prepared.nominal.problem.data
         tried = sets_with_one_more([h.short for h in level if h.short is not None], self.able, progress)
         grown: dict[tuple[str, ...], Hypothesis] = {}
@@ -209,12 +211,12 @@ class InStretches(View):
         return list(grown.values())
 
     def with_forms(self, children: Sequence[Hypothesis], level: Sequence[Hypothesis]) -> Sequence[Hypothesis]:
-        """Sets with their forms freed where the textbook form leaves more than sensors and springs may."""
+        """Sets with their forms freed if the textbook form leaves more than sensors and springs may cause."""
         may = self.base.settings.weighing.model_error**2 * self.gap.motion / self.base.count
         return with_forms(children, self.gap, min(FORM_OPEN * level[0].fit.excess, may))
 
     def to_grow(self, level: Sequence[Hypothesis], going: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """The best child of each parent, then the others: the best fit at first may lead nowhere."""
+        """The best child of each parent, then the others: the best fit at first may be a dead end."""
         first: list[Hypothesis] = []
         for parent in level:
             own = [h for h in going if h not in first and set(parent.effects) < set(h.effects)]
@@ -230,10 +232,10 @@ class InStretches(View):
         return None
 
     def for_whole_runs(self, likely: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
-        """The likely sets fitted to whole runs, where the runs differ or are shaken beside one of them; else none.
+        """The likely sets fitted to whole runs if the runs show scatter or a random moment beside one.
 
-        Chance differences between runs and random moments are compared in whole runs alone. In stretches the first
-        would be taken for effects, and the releases of the stretches would absorb the second.
+        Chance differences between runs and random moments are compared in whole runs only. On stretches the
+        first would look like effects, and the releases of the stretches would absorb the second.
         """
         found = sorted(filter(None, map(self.whole, likely)), key=lambda one: one.fit.total)
         kinds = self.prepared.kinds

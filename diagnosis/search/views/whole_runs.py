@@ -33,7 +33,7 @@ from diagnosis.search.views.view import View
 from diagnosis.search.weights import OF_MOTION, error_of_form, log_misfit, misfit_scale
 
 REACH_FROM: Final = 0.5
-"""Unexplained share of the gap, for the best set of a size, above which the limit of larger sets is computed.
+"""Unexplained share of the gap, for the best set of a size, above which the limit for larger sets is computed.
 Judgement. The largest of a few causes explains about half of a gap."""
 OUT_OF_REACH: Final = 0.2
 """Unexplained share of the gap, with all effects together, above which no larger sets are grown. Estimated.
@@ -42,15 +42,15 @@ six of 14 campaigns with a cause outside the vocabulary it exceeds 0.4. These ca
 test."""
 NEARLY_EXPLAINED: Final = 0.2
 """Maximum unexplained share of the gap within runs for the forms of a set beside scatter to be freed.
-Judgement. The effect of another form of a cause differs from the textbook form's by less than 45 %. In
-two simulated campaigns of three and four causes, free forms did not improve sets with an unexplained share of
-0.26 to 0.81."""
+Judgement. The effect of another form of a cause differs from the textbook form's by less than 45 %. In two
+simulated campaigns of three and four causes, free forms did not improve sets with an unexplained share of 0.26
+to 0.81."""
 GROWN_BESIDE: Final = 0.2
 """Maximum unexplained share of the gap within runs for a set beside scatter to be extended, where no set
 explains the runs. Judgement (decision 0036). In two unblinded campaigns of two and three causes, the first
 cause left 0.02 and 0.09. Time against coverage."""
 BESIDE_SCATTER: Final = 4
-"""Number of sets, found for runs that repeat, that are compared with scatter between runs added. Judgement
+"""Number of sets, found for runs that repeat, that are compared after scatter between runs is added. Judgement
 (decision 0036). Time against coverage."""
 
 
@@ -59,9 +59,9 @@ class WholeRuns(View):
     """Whole runs, without the long rest at the end of some.
 
     Args:
-        first: the set that all others contain; None: the empty set.
-        unscattered: the nominal fit with runs that repeat exactly, where the base's runs do not.
-        known: the likely sets of another view, beside which the runs may differ or be shaken.
+        first: the set contained in all others; None: the empty set.
+        unscattered: the nominal fit to runs that repeat exactly, if the runs of the base do not.
+        known: the likely sets of another view; scatter or a random moment may act beside them.
     """
 
     first: Hypothesis | None = None
@@ -72,7 +72,7 @@ class WholeRuns(View):
 
     @classmethod
     def after(cls, prepared: Prepared, known: Sets | None, clock: StepClock) -> Self | None:
-        """The first view, or one after a view whose answer does not hold in whole runs, or lacks their noise."""
+        """The first view, or the view after one that lacks the noise of whole runs, or an answer in them."""
         holds = known is not None and known.view.holds(known.answer, known.confirmed)
         with clock.step("effects"):
             others = () if known is None else known.view.for_whole_runs(known.likely)
@@ -90,13 +90,13 @@ class WholeRuns(View):
         """
         first = prepared.ringing
         moving, rested = without_long_rest(prepared.nominal.problem.data)
-        if rested:  # where dry friction stops a body, χ² has many minima
+        if rested:  # if dry friction stops a body, χ² has many minima
             nominal = try_fit(replace(prepared.nominal.problem, data=moving), prepared.nominal.point)
-            if nominal is not None:  # the rest may be too short: then whole runs
+            if nominal is not None:  # the rest may be too short: then whole runs are fitted
                 prepared = replace(prepared, nominal=nominal, rested=rested)
         if not prepared.nominal.problem.scatter:
             return cls(prepared, prepared.nominal, first, known=known)
-        # the runs differ as much as stated, or more
+        # the scatter is the stated one, or larger
         base = scattered(prepared.nominal, prepared.kinds) or prepared.nominal
         repeating = try_fit(*without_deviations(prepared.nominal)) or prepared.nominal
         return cls(prepared, base, first, unscattered=repeating, known=known)
@@ -111,7 +111,8 @@ class WholeRuns(View):
     def shaken(self) -> tuple[Hypothesis, ...]:
         """The sets with a random moment beside effects; none without known sets.
 
-        These come from stretches: the nominal model loses the phase, which a moment alone does not explain.
+        The known sets come from stretches: a random moment alone does not explain why the nominal model loses
+        the phase.
         """
         tried = weigh_random_moments(self, self.known) if self.known else []
         return tuple(one for one in tried if one.effects)
@@ -138,15 +139,15 @@ class WholeRuns(View):
 
     @property
     def smallest(self) -> Hypothesis:
-        """The set that all others contain."""
+        """The set contained in all others."""
         return self.first or Hypothesis((), self.base, repeating=self.unscattered)
 
     def sets(self, clock: StepClock) -> Sets:
         """The sets found, and the random moments that may act beside them.
 
-        Where the runs differ by chance, sets are grown in runs that repeat until one explains every run by itself.
-        From there on they are grown beside chance differences. Where none does, and no set explains runs that
-        repeat, the likeliest are compared beside such differences.
+        If the runs differ by chance, sets are first grown in runs that repeat, until one set explains every run
+        by itself. From there they grow beside chance differences. If no set does, and none explains runs that
+        repeat, the most likely sets are compared beside chance differences.
         """
         grown, explained = self.known, self.explained
         if not explained and self.shaken:
@@ -157,7 +158,7 @@ class WholeRuns(View):
         with clock.step("effects"):
             for step in () if explained else levels(self, clock.progress):
                 grown, floor = step.found, self._floor(step.level)
-                # the floor allows deviations of every run, so nothing is tried beside them
+                # the floor includes deviations of every run, so nothing is tried beside them
                 tried = map(self.beside, step.level if floor is None else ())
                 explained = tuple(one for one in tried if one is not None and self._explains(one))
                 if explained or floor is not None:
@@ -173,7 +174,7 @@ class WholeRuns(View):
             if any(one.effects and self._explains(one) for one in beside.hypotheses):
                 return _with_moments(beside, clock)  # nothing remains for a random moment
         plain = _with_moments(found, clock)
-        if plain.random:  # one that the runs refute must not hide differences between them
+        if plain.random:  # a moment that the runs refute must not hide differences between them
             plain = resolved(plain)
         if plain.weighed[0].effects != UNKNOWN or self.scattering is None:
             return plain
@@ -181,9 +182,9 @@ class WholeRuns(View):
         return plain if beside.weighed[0].effects == UNKNOWN else beside
 
     def _floor(self, level: Sequence[Hypothesis]) -> float | None:
-        """The least share of the gap that all effects together leave, where no larger set could be the cause.
+        """The share of the gap that all effects together leave, if no larger set could be the cause.
 
-        Computed where the sets of a level leave most of the gap; else None.
+        Computed if the sets of a level leave most of the gap; else None.
         """
         gap = self.base.total - self.base.count
         if not level or any(
@@ -194,7 +195,7 @@ class WholeRuns(View):
         return left if left > OUT_OF_REACH else None
 
     def beside(self, one: Hypothesis) -> Hypothesis | None:
-        """A set beside chance differences between the runs, its forms free where the runs need that.
+        """A set beside chance differences between the runs, with free forms if the runs need them.
 
         None where the runs do not differ, or the fit fails.
         """
@@ -224,7 +225,7 @@ class WholeRuns(View):
         return bool(left < share * gap)
 
     def likeliest_part(self, explained: Sequence[Hypothesis]) -> Hypothesis:
-        """The likeliest of the sets that explain every run by itself, or of their parts that do.
+        """The most likely set that explains every run by itself, or its most likely part that does.
 
         In runs that repeat, a set often contains an effect that imitates differences between the runs.
         """
@@ -254,9 +255,9 @@ class WholeRuns(View):
         """The sets beside chance differences between the runs.
 
         Args:
-            likely: sets in runs that repeat, the likeliest first.
-            explained: the set that explains every run by itself, from which larger ones are grown; None: there is
-                none, and they are grown from scatter alone, as long as one nearly explains the runs.
+            likely: sets in runs that repeat, the most likely first.
+            explained: the set that explains every run by itself and is grown further. None: no set does; sets
+                then grow from scatter alone, as long as one nearly explains the runs.
         """
         none, view = self._none, self._differing(explained)
         grown = tuple[Hypothesis, ...]()
@@ -282,7 +283,7 @@ class WholeRuns(View):
         """The view of runs that differ by chance.
 
         Args:
-            first: the set that all others contain; None: the empty one.
+            first: the set contained in all others; None: the empty set.
         """
         assert self.scattering is not None
         return replace(self, base=self.scattering, unscattered=self.base, first=first or self._none)
@@ -296,11 +297,11 @@ class WholeRuns(View):
         return hypothesis
 
     def finished(self, settled: Hypothesis) -> Hypothesis:
-        """The answer fitted to convergence; done last because another view may follow."""
+        """The answer fitted to convergence; a later step, because another view may follow."""
         return self.with_differences(polish(settled))
 
     def with_differences(self, polished: Hypothesis) -> Hypothesis:
-        """An answer with chance differences between the runs, where they pay the price of an effect."""
+        """An answer with chance differences between the runs, if they pay the price of an effect."""
         found, stated = polished.fit, bool(self.prepared.nominal.problem.scatter)
         repeats: Fit | None = found
         if found.problem.scatter:
@@ -332,6 +333,6 @@ def _with_moments(found: Sets, clock: StepClock) -> Sets:
 
 
 def _with_random(random: Sequence[Hypothesis], found: Sets) -> Sets:
-    """Sets with random moments, and without them: a moment may not be real."""
+    """Sets with random moments, and the same sets without them: a moment may not be real."""
     sets = without_the_random_moment(random, found.hypotheses, found.view.gap)
     return replace(found, random=tuple(random), hypotheses=tuple(sets))

@@ -15,7 +15,7 @@ class RecordSlip(ABC):
 
     @abstractmethod
     def mend(self, campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
-        """The campaign without the fault, and a remark on each action, or on a fault that cannot be mended."""
+        """The campaign without the fault, with a remark on each action, or on a fault that cannot be mended."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +25,7 @@ class SlipEvidence:
     Args:
         campaign: the records in use, with the sensor's zeros decided from them.
         stated: the campaign as given.
-        swings: of its free decays that oscillate, in their order.
+        swings: swings of the campaign's oscillating free decays, in their order.
     """
 
     campaign: Campaign
@@ -38,4 +38,4 @@ class StatementSlip(ABC):
 
     @abstractmethod
     def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
-        """A remark for each contradicted statement; none where all may be right."""
+        """A remark for each contradicted statement; none if all may be right."""

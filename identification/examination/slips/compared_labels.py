@@ -1,4 +1,4 @@
-"""Labels of several runs against their frequencies: exchanged, renumbered, off the line of the others.
+"""Labels of several runs against their frequencies: exchanged, renumbered, or off the line of the others.
 
 Every run obeys Kr = Izz ωn² + Ka with a common Izz and with Ka proportional to ½ρV². The runs of one spring lie
 on a straight line of ωn² against ½ρV², whatever the error of the spring. If the statements contradict the
@@ -25,7 +25,7 @@ from identification.status import WITHHOLDS, Outcome, Remark
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.vocabulary.record import Array
 
-_CANDIDATES = 12  # runs that fit worst, each tried against all others
+_CANDIDATES = 12  # number of worst-fitting runs, each tried against all others
 _LEAST_RUNS = 2
 _SPRINGS = "spring_stiffness"
 
@@ -78,7 +78,7 @@ class LabelsExchanged(StatementSlip):
     """Springs or wind speeds of two runs, or of all runs of two settings, are exchanged. Refused."""
 
     def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
-        """Exchange the labels of runs that fit badly with all others' labels."""
+        """Exchange the labels of badly fitting runs with all others' labels."""
         known = [swing for swing in evidence.swings if swing.run.spring_stiffness is not None]
         if len(known) < _LEAST_RUNS:
             return ()
@@ -110,12 +110,12 @@ class LabelsExchanged(StatementSlip):
 
 
 def _other_fits(swings: Sequence[Swing]) -> list[tuple[float, float | None]]:
-    """Possible values of Izz and Ka where the stated springs of the runs contradict the frequencies.
+    """Possible values of Izz and Ka if the stated springs contradict the frequencies.
 
     Returns:
-        Izz in kg m² and Ka over ½ρV² in m³/rad (None where it is not determined): without each spring in turn,
-        with a stiffness common to all runs, as a tilted axis has, and with the wind speeds of two settings
-        exchanged where the statements then agree.
+        Izz in kg m² and Ka over ½ρV² in m³/rad (None where it is not determined): without each spring in turn;
+        with a stiffness common to all runs, such as a tilted axis adds; and with the wind speeds of two
+        settings exchanged, if the statements then agree.
     """
     labels = Labels.of([swing for swing in swings if swing.run.spring_stiffness is not None])
     found = [_fitted(labels, labels.spring != spring) for spring in np.unique(labels.spring)]
@@ -147,8 +147,9 @@ def _fitted(
 def _misfit(labels: Labels, what: str) -> tuple[_Misfit, Array]:
     """Misfit of all runs, and the residual of each.
 
-    For stated springs: of Kr = Izz k + C ½ρV², weighted by the frequencies and the springs' tolerance. The runs of
-    one spring share its error, so they count once together. For stated wind speeds: of k = k0(spring) - c ½ρV².
+    For stated springs: of Kr = Izz k + C ½ρV², weighted by the frequencies and the springs' tolerance. The runs
+    of one spring share its error, so they count once together. For stated wind speeds: of k = k0(spring) − c
+    ½ρV².
     """
     springs, place, count = np.unique(labels.spring, return_inverse=True, return_counts=True)
     if what == _SPRINGS:
@@ -179,7 +180,7 @@ def _misfit(labels: Labels, what: str) -> tuple[_Misfit, Array]:
 
 
 def _exchanged(labels: Labels, away: Array, what: str) -> Iterator[tuple[tuple[int, ...], Labels]]:
-    """Statements exchanged between two runs, if one fits badly, or between all runs of two settings."""
+    """Statements exchanged between two runs, if one of them fits badly, or between all runs of two settings."""
     worst: NDArray[np.intp] = np.argsort(-away)[:_CANDIDATES]
     pairs = sorted({(min(i, j), max(i, j)) for i in worst.tolist() for j in range(away.size) if i != j})
     values = labels.spring if what == _SPRINGS else labels.pressure
@@ -216,9 +217,9 @@ def _speeds_exchanged(labels: Labels) -> Iterator[tuple[tuple[int, ...], Labels]
         yield tuple(np.sort(np.concatenate([one, two])).tolist()), replace(labels, pressure=other)
 
 
-_LEAST = 3  # springs needed to identify the wrong one
+_LEAST = 3  # minimum number of springs for identifying the wrong one
 
-#: Kr/ωn² over the stated inertia where a value is in another unit.
+#: Ratios of Kr/ωn² to the stated inertia for a value in another unit.
 _SLIPS = {
     1e3: "spring_stiffness in N mm/rad",
     1e2: "spring_stiffness in N cm/rad",
@@ -282,7 +283,7 @@ class SpringsRenumbered(StatementSlip):
     """All springs are one number off, in the campaign's own order or in the packaged list. Refused."""
 
     def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
-        """Take each spring for its neighbour in a list; not where the campaign states that its values are right."""
+        """Take each spring for its neighbour in a list, unless the campaign states that its values are right."""
         if evidence.campaign.sensor.plausible is False:
             return ()
         still = [s for s in evidence.swings if not s.run.wind_on and s.run.spring_stiffness is not None]
@@ -330,12 +331,12 @@ def _renumbered(stated: _Springs, inside: NDArray[np.bool_], meant: Array, shift
 
 @dataclass(frozen=True)
 class SpringOffTheLine(StatementSlip):
-    """A spring that, according to the others, is not as stiff as stated. Noted."""
+    """A spring that is not as stiff as stated, according to the others. Noted."""
 
     def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
         """Compare the stated stiffnesses with the wind-off frequencies, within the tolerance of springs.
 
-        One remark: on the wrong spring if three or more springs identify it, else on all of them.
+        One remark: on the wrong spring if at least three springs identify it, else on all of them.
         """
         still = [s for s in evidence.swings if not s.run.wind_on and s.run.spring_stiffness is not None]
         if len({s.run.spring_stiffness for s in still}) < 2:
@@ -345,7 +346,7 @@ class SpringOffTheLine(StatementSlip):
             return ()
         fits = _other_fits(evidence.swings)
         figures = {"inertias_kg_m2": [one for one, _ in fits], "air_stiffnesses_m3": [air for _, air in fits]}
-        # The spring that differs beyond chance while the others agree.
+        # the spring that differs beyond chance while the others agree
         count, scores = springs.stiffness.size, []
         for place in range(count if count >= _LEAST else 0):
             rest = springs.without(place)
@@ -379,7 +380,7 @@ class InertiaOffTheSprings(StatementSlip):
     """A stated inertia that the springs contradict. Noted."""
 
     def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
-        """Compare the stated inertia with the wind-off runs'; a nominal inertia may be off a little.
+        """Compare the stated inertia with the wind-off runs'; a nominal inertia may be slightly wrong.
 
         The remark names the probable error of units; there is none where the campaign states ``plausible = false``.
         """

@@ -1,7 +1,7 @@
-"""One factor on the statements of a run, or of a group of runs, with which frequency and damping of all runs agree.
+"""One factor on the statements of a run or group of runs that makes frequency and damping of all runs agree.
 
-The air's part of k grows as ρV² and of a as ρV, and a wrong clock changes both of them wholly, so that the kinds of
-factors are told apart. An effect on all runs of one wind speed alike is not a slip.
+The air's part of k grows as ρV² and of a as ρV. A wrong clock changes both k and a entirely. The kinds of
+factors can therefore be distinguished. An equal effect on all runs of one wind speed is not a slip.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ from tunnel_sim.vocabulary.record import Array
 
 Places = tuple[int, ...]
 Changed = Callable[[RunConditions, float], RunConditions]
-_FEWEST = 4  # runs
-_MOST_RUNS = 40  # that are tried one by one, and from which on groups begin
+_FEWEST = 4  # minimum number of runs
+_MOST_RUNS = 40  # maximum number of runs that are tried one by one; beyond it groups are tried
 _MOST_SAID = 3
-_LARGEST = 0.7  # of a decrease: greater slips are units and labels
-_IDLE = 0.25  # of the least stated wind: a first guess
+_LARGEST = 0.7  # maximum share of a decrease: greater slips are units and labels
+_IDLE = 0.25  # multiple of the least stated wind: a first guess
 _LAGS = (0.1, -0.1)  # radians of phase: first guesses
 _CERTAIN = 1e6  # degrees of freedom of a bound
 _UNITS = {"wind_speed": "m/s", "air_density": "kg/m3", "spring_stiffness": "N m/rad"}
@@ -46,11 +46,11 @@ _KINDS = {"speed": "wind_speed", "density": "air_density", "clock": "time_s", "s
 class WrongFactor(StatementSlip):
     """One factor on a speed, a density, a spring or a clock makes all runs agree, and no effect does.
 
-    Refused; asked about where the evidence is weaker.
+    Refused, or asked about where the evidence is weaker.
     """
 
     def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
-        """Try factors on every run, on groups and along the campaign; labels that agree as well go first."""
+        """Try factors on every run, on groups and along the campaign; labels that agree equally well come first."""
         swings = [s for s in evidence.swings if s.run.spring_stiffness and s.rate > 0.0 and s.stiffness > 0.0]
         if len(swings) < _FEWEST:
             return ()
@@ -64,11 +64,11 @@ class WrongFactor(StatementSlip):
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """A slip that all runs agree with, and that the stated conditions and every single effect do not.
+    """A slip that makes all runs agree, unlike the stated conditions and every single effect.
 
     Args:
-        level: of the scatter between runs, over the usual one.
-        refused: whether chance explains it less than once in a lifetime.
+        level: scatter between the runs, over the usual scatter.
+        refused: whether chance explains the slip less than once in a lifetime.
     """
 
     trial: TrialSlip
@@ -78,9 +78,9 @@ class _Found:
 
 
 def _agreeing(m: MeasuredMotions) -> list[_Found]:
-    """The slips that the runs agree with about equally well, the best first; none where they may agree without.
+    """The slips with which the runs agree about equally well, the best first; none if no slip is needed.
 
-    Springs as stated come first; then springs that may be off.
+    The springs are tried as stated first, then with errors.
     """
     stated = fitted(m, wide=True)
     if stated.freedom < 2 or stated.squares(policy.LEVELS_OF_SCATTER[0]) <= stated.freedom:
@@ -103,10 +103,10 @@ def _agreeing(m: MeasuredMotions) -> list[_Found]:
 def _rounded(
     m: MeasuredMotions, ties: Sequence[_Found], level: float, limit: float, *, wide: bool
 ) -> Iterator[_Found]:
-    """Two springs that one rounded value states, where they agree as well as a wrong clock.
+    """Two springs with one rounded stated value, if they agree as well as a wrong clock.
 
     Args:
-        limit: of the sum of squares at the level of scatter.
+        limit: limit of the sum of squares at the level of scatter.
     """
     parts: dict[Places, float] = {}
     for one in ties:
@@ -125,9 +125,9 @@ def _rounded(
 
 
 def _judged(trial: TrialSlip, fit: ConditionsFit, effects: Sequence[ConditionsFit]) -> _Found | None:
-    """A trial that makes the runs agree; None where its number may be an effect's, chance, or none.
+    """A trial that makes the runs agree; None if its number may be due to an effect or to chance, or is zero.
 
-    The gain of one more number is tested by F with the scatter that remains, with this and the usual scatter of
+    The gain by one more number is tested by F with the remaining scatter, combined with the usual scatter of
     rigs, and with the greatest scatter that chance is believed to cause.
     """
     size = abs(fit.number) if trial.kind == "idle" else fit.number
@@ -190,7 +190,7 @@ def _blowing(places: Places, unit: float) -> Changed:
 
 
 def _slips(m: MeasuredMotions) -> Iterator[TrialSlip]:
-    """All tried slips: of single runs, of groups, a wind in runs that state none, and along the campaign."""
+    """All tried slips: in single runs, in groups, a wind in runs that state none, and along the campaign."""
     count, windy = m.stiffness.size, m.conditions.speed > 0.0
     on, off = (tuple(np.flatnonzero(some).tolist()) for some in (windy, ~windy))
     least = policy.LEAST_FACTOR

@@ -1,9 +1,9 @@
-"""The straight lines of runs with right labels, with tolerances that only a slip exceeds.
+"""Straight lines through runs with right labels, with tolerances that only a slip exceeds.
 
-Every run has k = ωn² = g Kr (1 + d) − n ½ρV² with g = 1/Izz: n is common, and d is the departure of a spring, by
-its calibration, gravity, a flexible rod or a nonlinearity. A slip is a discrete change of Kr or V. Two things
-separate it from an effect: tolerances that include every effect, and a value that agrees where the stated one is
-grossly off.
+Every run has k = ωn² = g Kr (1 + d) − n ½ρV² with g = 1/Izz: n is common, and d is the deviation of a spring,
+due to its calibration, gravity, a flexible rod or a nonlinearity. A slip is a discrete change of Kr or V. Two
+things distinguish it from an effect: it exceeds tolerances that include every effect, and another value agrees
+where the stated one is grossly wrong.
 """
 
 from __future__ import annotations
@@ -21,9 +21,10 @@ from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.record import Array
 
 _PASSES = 4
-_MOST_AIR = 3.0  # air's stiffness over the total, a standard deviation: more is less likely, but not excluded
-_TINY = 1e-150  # of a column: it is without effect
-_LEAST = 1e-3  # of the usual g: lower bound of a fit to wrong labels
+# standard deviation of the air's stiffness over the total: more is less likely, but not excluded
+_MOST_AIR = 3.0
+_TINY = 1e-150  # relative size of a column below which it has no effect
+_LEAST = 1e-3  # share of the usual g: lower bound of a fit to wrong labels
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,10 +34,11 @@ class Statements:
     Args:
         spring: Kr, shape (n,), N m/rad.
         speed: V, shape (n,), m/s.
-        density: ρ, shape (n,), kg/m³; the median of the others for runs that state none, 1.2 where none states any.
+        density: ρ, shape (n,), kg/m³; for runs that state none the median of the others, or 1.2 if no run
+            states any.
         clock: stamped times over true ones, shape (n,); 1 as stated.
         recorded: k = ωn² by the stamped times, shape (n,), 1/s².
-        std: relative standard deviation of k, with its change along the run, shape (n,).
+        std: relative standard deviation of k, including its change along the run, shape (n,).
     """
 
     runs: tuple[Run, ...]
@@ -49,7 +51,7 @@ class Statements:
 
     @classmethod
     def of(cls, swings: Sequence[Swing]) -> Statements:
-        """Statements of the runs with a stated spring; if there are none, all have one spring of 1 N m/rad."""
+        """Statements of the runs with a stated spring; if there are none, all runs have one spring of 1 N m/rad."""
         known = [s for s in swings if s.run.spring_stiffness] or list(swings)
         runs = tuple(s.run for s in known)
         stated = [run.air_density for run in runs if run.air_density is not None]
@@ -66,7 +68,7 @@ class Statements:
 
     @property
     def stiffness(self) -> Array:
-        """K by the true times, shape (n,), 1/s²."""
+        """The stiffness K by the true times, shape (n,), 1/s²."""
         return np.asarray(self.recorded * self.clock**2)
 
     @property
@@ -77,14 +79,14 @@ class Statements:
 
 @dataclass(frozen=True, eq=False)
 class Agreement:
-    """How well statements and frequencies agree.
+    """The agreement of statements and frequencies.
 
     Args:
         squares: sum of squared residuals over tolerances, dimensionless.
-        away: residual of each run in tolerances, shape (n,).
+        away: residual of each run, in tolerances, shape (n,).
         inverse_inertia: g, 1/(kg m²).
         air: n, the air's part of k, 1/(kg m²) per m³.
-        columns: of g and n in the last fit, shape (rows, 2).
+        columns: columns of g and n in the last fit, shape (rows, 2).
     """
 
     squares: float
@@ -108,7 +110,7 @@ class Agreement:
 
     @property
     def good(self) -> bool:
-        """Whether the statements agree well: right labels have small residuals in tolerances so wide."""
+        """Whether the statements agree well: right labels have small residuals in such wide tolerances."""
         return self.squares <= float(chdtri(max(self.freedom, 1), policy.SLIP_AGREES))
 
 
@@ -169,7 +171,7 @@ def agreement(
 
 
 def _settings(values: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Values that differ by more than two springs must, and the index among them of each run's value."""
+    """The distinct values, which differ by more than two springs may, and for each run the index of its value."""
     order = np.argsort(values)
     new = np.diff(values[order]) > policy.LEAST_SPRING_SPREAD * values[order][1:]
     group = np.concatenate(([0], np.cumsum(new)))

@@ -1,4 +1,4 @@
-"""The clock and the sensor of all runs: a clock that drifts along the runs, a sensor without constant values."""
+"""The clock and the sensor of all runs: a clock that drifts along the runs, a sensor that loses constant values."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from tunnel_sim.vocabulary.quantities import Angles
 from tunnel_sim.vocabulary.record import Array
 
 _WINDOW = 2.0  # cycles: a Hann window of two cycles removes the zero and twice the frequency
-_FEWEST = 6  # phases of a run
+_FEWEST = 6  # minimum number of phases in a run
 _PHASE = 1e-3  # rad: remainder of zero and damping after the window
-_LEAST_AMPLITUDE = 0.05  # of the first: later phases carry little information
+_LEAST_AMPLITUDE = 0.05  # share of the first amplitude: later phases carry little information
 #: Powers of the amplitude by which effects change a frequency: free play, an asymmetric spring, a cubic one.
 _POWERS = (-1.0, 1.0, 2.0)
 
@@ -29,7 +29,7 @@ class _Phase:
 
     Args:
         drift: phase by a clock whose rate changes by 1 over the run, shape (n,), rad.
-        amplitude: phases by amplitudes to the powers, shape (n, powers), rad.
+        amplitude: phase changes by powers of the amplitude, shape (n, powers), rad.
         free: constant and slope, shape (n, 2).
     """
 
@@ -45,10 +45,11 @@ class _Phase:
 class DriftingClock(StatementSlip):
     """All runs, or a single one, change their frequency linearly with time, not with the amplitude. Refused.
 
-    An effect changes the frequency with the amplitude, which falls faster in runs of greater damping. The phase of
-    each run relative to its own mean frequency shows which of the two applies, unless all runs are damped alike.
+    An effect changes the frequency with the amplitude, which falls faster in runs of greater damping. The phase
+    of each run relative to its own mean frequency shows whether time or amplitude is the cause, unless all runs
+    are damped alike.
 
-    A single run whose phase may as well jump at one instant is not refused: it may have been disturbed.
+    A single run with a phase that may as well jump at one instant is not refused: it may have been disturbed.
     """
 
     def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
@@ -86,7 +87,7 @@ def _jumps(phases: list[_Phase], place: int, squares: float) -> bool:
     """Whether a jump of a run's phase at one instant, as from a blow, fits no worse than a drift.
 
     Args:
-        place: of the run among the phases.
+        place: index of the run among the phases.
         squares: sum of squares of the residuals with the drift, dimensionless.
     """
     one = phases[place]
@@ -157,10 +158,10 @@ def _fitted_drift(
     return float(solution[0] / sizes[0]), float(1.0 / sizes[0]), float(residual @ residual), max(freedom, 1)
 
 
-_CONSTANTS = np.geomspace(0.25, 32.0, 22)  # of a cycle, τ tried
+_CONSTANTS = np.geomspace(0.25, 32.0, 22)  # tried values of τ, as shares of a cycle
 _REFINED = 1.3  # factor on τ about the best of these
-_SWEEPS = 2  # of the poles' linear corrections
-_SHARE_LEFT = 0.05  # of the centre's decay that may remain as a zero
+_SWEEPS = 2  # sweeps of linear corrections of the poles
+_SHARE_LEFT = 0.05  # share of the centre's decay that may remain as a zero
 _LEAD = 0.2  # relative tolerance of the lead about arctan(1/ωτ)
 _LASTING = (
     0.5  # cycles; least τ in a single run. The hold of a hand is over within a cycle (three drawn: 0.19)
@@ -173,11 +174,11 @@ class _Decaying:
 
     Args:
         constant: τ, s.
-        period: of the oscillation, s.
-        centre: at the start, rad.
-        zero, zero_std: at the end, rad.
+        period: period of the oscillation, s.
+        centre: centre at the start, rad.
+        zero, zero_std: zero at the end with its standard deviation, rad.
         lead: phase lead of the oscillation beyond a release from rest, rad.
-        expected: lead from τ, rad.
+        expected: lead expected from τ, rad.
     """
 
     run: str
@@ -198,7 +199,7 @@ class _Decaying:
 
 @dataclass(frozen=True)
 class CoupledSensor(StatementSlip):
-    """The centre decays to zero and the oscillation leads, by one time constant. Refused: it looks like a drift.
+    """The centre decays to zero and the oscillation leads, with one time constant. Refused: it looks like a drift.
 
     The sensor is AC-coupled, with a high-pass filter before the logger. Its reading of a release is an oscillation
     with a phase lead of arctan(1/ωτ), about a centre that decays as exp(-t/τ) to zero. Creep of a spring also moves
@@ -206,12 +207,12 @@ class CoupledSensor(StatementSlip):
     """
 
     def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
-        """Fit a decaying centre to every free decay of an angle; most runs that have one must agree."""
+        """Fit a decaying centre to every free decay of an angle; most runs that show one must agree."""
         if evidence.campaign.sensor.derivative or not evidence.swings:
             return ()
         decaying = [one for swing in evidence.swings if (one := _decaying(swing)) is not None]
         found = [one for one in decaying if one.coupled]
-        if 2 * len(found) <= len(decaying):  # one sensor reads all runs; beside a drift some lead by chance
+        if 2 * len(found) <= len(decaying):  # one sensor reads all runs; with a drift some lead by chance
             return ()
         if len(found) == 1 < len(evidence.swings) and found[0].constant < _LASTING * found[0].period:
             return ()
@@ -225,7 +226,7 @@ class CoupledSensor(StatementSlip):
 
 
 def _decaying(swing: Swing) -> _Decaying | None:
-    """The best decaying centre; None where the run has none beyond chance."""
+    """The best decaying centre; None if the run has none beyond chance."""
     time, yaw, decay = swing.time, swing.motion + swing.zero, Decay(swing.rate, swing.stiffness)
     if decay.omega_d == 0.0:
         return None
@@ -258,7 +259,7 @@ def _decaying(swing: Swing) -> _Decaying | None:
 
 
 def _fit_with_centre(time: Array, yaw: Array, decay: Decay, tau: float) -> tuple[float, Decay, Array, Array]:
-    """Sum of squares, corrected poles, solution in the order of the columns, and the normal matrix's inverse."""
+    """Sum of squares, corrected poles, solution in the order of the columns, and the inverse normal matrix."""
     for _ in range(_SWEEPS):
         unit, sine, slope, ramp, one = response_rows(time, decay, constant=True)
         matrix = np.column_stack([unit, sine, slope, ramp, np.exp(-time / tau), one])

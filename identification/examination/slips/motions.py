@@ -1,7 +1,7 @@
-"""Frequency and damping of all runs beside their stated conditions, with the scatter between runs as it is.
+"""Frequency and damping of all runs against their stated conditions, at the actual scatter between runs.
 
-Every run has k = ωn² = s − n ½ρV² and 2a = c + m ½ρV: s and c belong to its spring, n and m are common. Where the
-runs repeat well, a small contradiction is significant, and where they scatter, only a large one.
+Every run has k = ωn² = s − n ½ρV² and 2a = c + m ½ρV: s and c belong to its spring, n and m are common. If the
+runs repeat well, a small contradiction is significant; if they scatter, only a large one.
 """
 
 from __future__ import annotations
@@ -18,26 +18,26 @@ from tunnel_sim.vocabulary.between_runs import USUAL_SCATTER
 from tunnel_sim.vocabulary.quantities import Vector
 from tunnel_sim.vocabulary.record import Array
 
-_STEPS = 8  # of Gauss and Newton
+_STEPS = 8  # iterations of Gauss and Newton
 _PASSES = 3  # the tolerances scale with the fitted values
-_SETTLED = 1e-6  # of the tried number
-_DIFFERENCE = 1e-6  # of the tried number, for its derivative
-_LONGEST = 0.25  # step of the tried number
-_HALVINGS = 20  # of the interval of the scatter's level
+_SETTLED = 1e-6  # tolerance of the tried number
+_DIFFERENCE = 1e-6  # relative step of the tried number, for its derivative
+_LONGEST = 0.25  # maximum step of the tried number
+_HALVINGS = 20  # halvings of the interval of the scatter's level
 _TINY = 1e-300
 
 
 @dataclass(frozen=True, eq=False)
 class RunConditions:
-    """Stated conditions of the runs, or a trial's conditions in their place; each array of shape (n,).
+    """Conditions of the runs, as stated or in a trial; each array has the shape (n,).
 
     Args:
         spring: factor on the stated stiffness.
-        speed: V, m/s.
-        density: ρ, kg/m³.
+        speed: wind speed V, m/s.
+        density: air density ρ, kg/m³.
         clock: stamped times over true ones.
         moment: factor on the air's stiffness.
-        lag: of the air's moment, s.
+        lag: lag of the air's moment, s.
     """
 
     spring: Array
@@ -53,9 +53,9 @@ class MeasuredMotions:
     """Measured frequency and damping of the runs.
 
     Args:
-        stiffness, stiffness_std: k, shape (n,), 1/s².
-        rate, rate_std: a, shape (n,), 1/s.
-        stated: spring stiffness, shape (n,), N m/rad.
+        stiffness, stiffness_std: k and its standard deviation, shape (n,), 1/s².
+        rate, rate_std: a and its standard deviation, shape (n,), 1/s.
+        stated: stated spring stiffness, shape (n,), N m/rad.
         place: index of the run's spring, shape (n,).
         springs: number of springs.
     """
@@ -103,14 +103,14 @@ class MeasuredMotions:
 
 @dataclass(frozen=True, eq=False)
 class TrialSlip:
-    """Conditions with one more number.
+    """Conditions that depend on one more number.
 
     Args:
-        change: the conditions with a number.
-        places: of the runs concerned.
-        kind: of the slip; empty for an effect.
-        least: least size of the number that is not an effect, dimensionless.
-        start: of the number, dimensionless.
+        change: function from a number to the conditions.
+        places: indices of the runs concerned.
+        kind: kind of slip; empty for an effect.
+        least: minimum size of the number for it to be a slip, not an effect, dimensionless.
+        start: starting value of the number, dimensionless.
     """
 
     change: Callable[[RunConditions, float], RunConditions]
@@ -125,10 +125,10 @@ class ConditionsFit:
     """A fit of the runs to conditions.
 
     Args:
-        number: of the trial; 0 without one.
+        number: number of the trial; 0 without a trial.
         left: residuals of k, a, the springs' stiffness and the springs' damping, shape (2 n + 2 springs,).
-        std: their standard deviations by the noise and the tolerances of the springs.
-        chance: their standard deviations by the usual scatter between runs.
+        std: standard deviations of the residuals due to noise and the tolerances of the springs.
+        chance: standard deviations of the residuals due to the usual scatter between runs.
         freedom: degrees of freedom.
     """
 
@@ -139,7 +139,7 @@ class ConditionsFit:
     freedom: int
 
     def squares(self, level: float) -> float:
-        """Sum of squares in standard deviations, where the runs scatter by ``level`` times the usual."""
+        """Sum of squared residuals over variances, with ``level`` times the usual scatter of the runs."""
         return float(np.sum(self.residuals**2 / (self.std**2 + (level * self.chance) ** 2)))
 
     def level(self) -> float:
@@ -159,7 +159,7 @@ def fitted(motions: MeasuredMotions, trial: TrialSlip | None = None, *, wide: bo
     """Fit the springs, g, n, c and m to the runs, and the number of a trial.
 
     Args:
-        wide: whether springs may depart from their statements as far as any effect makes them.
+        wide: whether springs may deviate from their statements as far as any effect makes them.
     """
     m, number, step = motions, 0.0 if trial is None else trial.start, 0.0
     target = np.concatenate((m.stiffness, m.rate, np.zeros(2 * m.springs)))
@@ -188,7 +188,7 @@ def fitted(motions: MeasuredMotions, trial: TrialSlip | None = None, *, wide: bo
 
 
 def _matrix(m: MeasuredMotions, c: RunConditions) -> Array:
-    """Rows of k and a by the recorded times, then of every spring's stiffness and damping beside the common ones.
+    """Rows of k and a by the recorded times, then of every spring's relative stiffness and damping.
 
     The unknowns are s of every spring, g, n, c of every spring, the common c, and m.
     """
@@ -212,7 +212,7 @@ def _matrix(m: MeasuredMotions, c: RunConditions) -> Array:
 def _tolerances(
     m: MeasuredMotions, air: float, damping: float, air_damping: float, *, wide: bool
 ) -> tuple[Vector, Vector]:
-    """Standard deviations of the rows, by the noise and the springs, and by the usual scatter between runs.
+    """Standard deviations of the rows, due to the noise and the springs, and due to the usual scatter between runs.
 
     Args:
         air: n, 1/(kg m²) per m³.

@@ -1,4 +1,4 @@
-"""The sensor of some runs differs from the others': gain, noise or bandwidth, sign, or unit of the angle."""
+"""The sensor of some runs differs from the others' in gain, noise, bandwidth, sign, or unit of the angle."""
 
 from __future__ import annotations
 
@@ -19,17 +19,18 @@ from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Run, speed_groups
 from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced
 
-_FEWEST_RELEASED = 5  # runs that state their release: three others do not show how widely they scatter
-_LEAST_SAMPLES = 2 * policy.LEAST_SAMPLES  # of a record of two halves
+# minimum number of runs that state their release: three others do not show how widely they scatter
+_FEWEST_RELEASED = 5
+_LEAST_SAMPLES = 2 * policy.LEAST_SAMPLES  # minimum number of samples of a record with two halves
 
 
 @dataclass(frozen=True)
 class OtherGain:
-    """The gain of one run over the gain of the others.
+    """The gain of one run relative to the others'.
 
     Args:
-        ratio: of the gains.
-        std: its standard deviation.
+        ratio: ratio of the gains.
+        std: standard deviation of the ratio.
     """
 
     run: Run
@@ -41,8 +42,8 @@ class OtherGain:
 class OddGain(StatementSlip):
     """Noise and swing of one run are the others' times one factor. Named: ωn and ζ do not change.
 
-    In a linear decay a gain, such as another range of the amplifier, looks like another release. But it scales the
-    noise of the sensor by the same factor as the swing, and a release does not.
+    In a linear decay another gain, such as another range of the amplifier, looks like another release. But it
+    scales the noise of the sensor by the same factor as the swing, and another release does not.
     """
 
     def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
@@ -62,7 +63,7 @@ class OddGain(StatementSlip):
 
 
 def other_gain(evidence: SlipEvidence) -> OtherGain | None:
-    """The one run with another gain; None where there is none, or where several runs may have one."""
+    """The one run with another gain; None if there is none, or if several runs may have one."""
     swings = [
         s for s in evidence.swings if s.run.release_angle and s.run.record.time_s.size >= _LEAST_SAMPLES
     ]
@@ -89,22 +90,23 @@ def other_gain(evidence: SlipEvidence) -> OtherGain | None:
 def odd_gains(
     swing: Array, noise: Array, noise_std: Array, *, tests: int = 1
 ) -> tuple[tuple[int, float, float], ...]:
-    """The runs whose noise and swing both differ from the other runs, by one factor.
+    """The runs with noise and swing that both differ from the other runs', by one factor.
 
-    Both must differ at `policy.DIFFERENCE_RATE` per campaign, so that one of them alone, such as a release from a
-    wrong angle, names no run more often; a campaign without either is named at about its square. The factors must
-    agree, and the noise must be as large in both halves of the run: in a clipped run it is not, and a fast motion
-    that looks like noise decays.
+    Both must differ at `policy.DIFFERENCE_RATE` per campaign. A difference in one of them, such as a release
+    from a wrong angle, therefore does not name a run more often; a campaign with neither is named at about the
+    square of this rate. The factors must agree, and the noise must be equal in both halves of the run: in a
+    clipped run it is not, and a fast motion that looks like noise decays.
 
     Args:
         swing: logarithms of the ratios to the stated releases, shape (runs,).
         noise: logarithms of the noise in both halves, shape (runs, 2).
-        noise_std: by the number of samples, of a whole run, shape (runs,).
-        tests: number of such tests of a campaign.
+        noise_std: standard deviation of the noise's logarithm by the number of samples, of a whole run, shape
+            (runs,).
+        tests: number of such tests in a campaign.
 
     Returns:
-        Place of each such run, the logarithm of its factor by the swing, and its standard deviation: rounding
-        biases the factor by the noise.
+        For each such run its index, the logarithm of its factor by the swing, and the standard deviation:
+            rounding biases the factor by the noise.
     """
     known = np.hypot(noise_std, policy.SCATTER_OF_NOISE)
     excess, excess_std, of_excess = _departures(swing, np.full(swing.size, policy.SCATTER_OF_RELEASE))
@@ -121,10 +123,10 @@ def odd_gains(
 
 
 def _departures(values: Array, usual: Array) -> tuple[Array, Array, Array]:
-    """Departure of every value from the mean of the others, its standard deviation and its degrees of freedom.
+    """Deviation of every value from the mean of the others, its standard deviation and its degrees of freedom.
 
-    The scatter is estimated from the others, with `policy.SCATTER_FREEDOM` degrees of freedom of the usual one
-    where they bear it out, else from the others alone. All results have shape (runs,).
+    The scatter is estimated from the others, combined with the usual scatter as `policy.SCATTER_FREEDOM`
+    degrees of freedom if the two agree, else from the others alone. All results have shape (runs,).
 
     Args:
         usual: usual scatter of each value, shape (runs,).
@@ -151,11 +153,11 @@ def _variances(swings: list[Swing]) -> tuple[Array, Array]:
     return variances, degrees
 
 
-_FEWEST_COMPARED = 4  # runs
-_ABOVE = 8.0  # times the frequency of the motion: its harmonics have ended
-_BELOW = 0.45  # of the lowest sample rate
-_LEAST_BINS = 16  # of a record in a band: their median scatters by a quarter
-_SPREAD = 1.7  # greatest ratio of the noise of the other runs: they have one sensor
+_FEWEST_COMPARED = 4  # minimum number of runs
+_ABOVE = 8.0  # multiple of the motion's frequency: its harmonics have ended
+_BELOW = 0.45  # share of the lowest sample rate
+_LEAST_BINS = 16  # minimum number of ordinates of a record in a band: their median scatters by a quarter
+_SPREAD = 1.7  # maximum ratio of the other runs' noise: they have one sensor
 _SPREADS = 4.0  # logarithms of that ratio
 
 
@@ -163,15 +165,15 @@ _SPREADS = 4.0  # logarithms of that ratio
 class OddNoise(StatementSlip):
     """One run has far less or far more noise than all others, in some band of frequencies. Named.
 
-    It has another range, sensor, cable or filter.
-    A run with far less noise is refused: a filter smooths its start, which looks like other oscillations.
+    It has another range, sensor, cable or filter. A run with far less noise is refused: a filter smooths its
+    start, which looks like other oscillations.
     """
 
     def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
         """Compare the median power of all runs in octaves above the motion; a line of hum does not change it.
 
-        The wind may add noise: a run is compared with others of as much wind, or as little. `OddGain` names a run
-        of another gain.
+        The wind may add noise: a run is compared only with others of similar wind. `OddGain` names a run with
+        another gain.
         """
         if len(evidence.swings) < _FEWEST_COMPARED or other_gain(evidence) is not None:
             return ()
@@ -198,11 +200,11 @@ class OddNoise(StatementSlip):
 
 
 def _less(swing: Swing, first: float, ratio: float) -> Remark:
-    """The remark on a run with less noise, a refusal where the difference is large.
+    """The remark on a run with less noise; a refusal if the difference is large.
 
     Args:
         first: lower end of the lowest such band, Hz.
-        ratio: logarithm of the least ratio of the noise to another run's.
+        ratio: logarithm of the smallest ratio of the noise to another run's.
     """
     what = (
         f"above {first:.2g} Hz its noise is 1/{significant(np.exp(-ratio), 2)} of that of every other run: the "
@@ -235,8 +237,9 @@ def _powers(swings: tuple[Swing, ...]) -> tuple[Array, Array]:
     return edges[:-1], np.maximum(np.array(rows), 1e-300)
 
 
-_FEWEST_SIDES = 3  # runs: of two different zeros, either may be right
-_NEAR = 0.25  # of the zero's size: greatest scatter of the zeros with right signs, so that the two sides are apart
+_FEWEST_SIDES = 3  # minimum number of runs: of two different zeros, either may be right
+# maximum scatter of the zeros with right signs, over the zero's size, which keeps the two sides apart
+_NEAR = 0.25
 
 
 @dataclass(frozen=True)
@@ -255,7 +258,7 @@ class MirroredRun(StatementSlip):
         zeros = np.array([swing.zero for swing in swings])
         std = np.array([max(swing.zero_std, 1e-300) for swing in swings])
         size = float(np.median(np.abs(zeros)))
-        # the runs that differ; if half of all, the runs that begin on the less usual side
+        # the runs that differ; if they are half of all, the runs that begin on the less usual side
         minus = zeros < 0.0
         odd = minus if 2 * minus.sum() < zeros.size else ~minus
         if not odd.any() or odd.all():
@@ -328,16 +331,16 @@ class ReleaseOnTheOtherSide(StatementSlip):
         return (Remark(Outcome.NOTED, tuple(ids), what, remedy),)
 
 
-_SUSPICIOUS = 10.0  # ratio to the amplitudes of other runs, from which the noise is compared
+_SUSPICIOUS = 10.0  # maximum ratio to the amplitudes of other runs; beyond it the noise is compared
 
 
 @dataclass(frozen=True)
 class AngleInDegrees(StatementSlip):
     """Amplitude and noise of some runs are 57.3 times the others', or 1/57.3 of them. Refused.
 
-    Of displacements in millimetres it is 1000 times.
+    For displacements in millimetres the factor is 1000.
 
-    The fewer runs are the wrong ones. Of as many large as small ones either may be wrong.
+    The smaller group of runs is wrong; of two equal groups either may be wrong.
     """
 
     def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:

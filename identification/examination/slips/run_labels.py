@@ -20,13 +20,13 @@ from identification.examination.slips.fits import Statements, agreement
 from identification.status import Outcome, Remark
 
 Key = Literal["spring", "speed", "density", "clock"]
-#: Names of the labels, and units where a label is a number of its own.
+#: Names of the labels, and units for labels that are numbers.
 _NAMES: Mapping[Key, str] = {
     "spring": "spring_stiffness", "speed": "wind_speed", "density": "air_density", "clock": "time_s",
 }  # fmt: skip
 _UNITS: Mapping[Key, str] = {"spring": "N m/rad", "speed": "m/s", "density": "kg/m3"}
-_FEWEST = 3  # runs: two determine g and n
-_MOST_SUSPECTS = 12  # number of the runs that agree worst; their labels are tried
+_FEWEST = 3  # minimum number of runs: two determine g and n
+_MOST_SUSPECTS = 12  # number of runs that agree worst; their labels are tried
 _MOST_PAIRED = 40  # number of runs up to which all pairs with a suspect are tried
 _MOST_SAID = 3
 _TIE = 1.0  # squared tolerances: slips that agree about equally well are all named
@@ -49,10 +49,10 @@ class Label(ABC):
 
     @abstractmethod
     def meant(self, value: float, others: Sequence[float]) -> Iterator[tuple[float, str]]:
-        """Values that may have been meant by a stated one, each with words for its origin.
+        """Values that may have been meant by a stated value, each with words for its origin.
 
         Args:
-            value: as stated, in the unit of the label.
+            value: stated value, in the unit of the label.
             others: values of the other runs, in that unit.
         """
 
@@ -75,14 +75,14 @@ class InAnotherUnit(Label):
 
 
 def _both_ways(factors: Mapping[str, float], unit: str) -> Mapping[str, float]:
-    """Factors of units, and of the right unit where the other runs have one of these."""
+    """Factors of units, and of the right unit if the other runs have one of these units."""
     others = {f"{unit}, the others {words}": 1.0 / factor for words, factor in factors.items()}
     return {**factors, **others}
 
 
 @dataclass(frozen=True)
 class SpeedInAnotherUnit(InAnotherUnit):
-    """A speed in km/h, knots, mph or ft/s, or in m/s where the others are in one of these."""
+    """A speed in km/h, knots, mph or ft/s, or in m/s if the others are in one of these."""
 
     key: ClassVar[Key] = "speed"
     factors: Mapping[str, float] = field(
@@ -94,7 +94,7 @@ class SpeedInAnotherUnit(InAnotherUnit):
 
 @dataclass(frozen=True)
 class SpeedDecimal(InAnotherUnit):
-    """A speed whose decimal point is one place off."""
+    """A speed with its decimal point one place off."""
 
     key: ClassVar[Key] = "speed"
     factors: Mapping[str, float] = field(default_factory=lambda: _DECIMAL)
@@ -102,7 +102,7 @@ class SpeedDecimal(InAnotherUnit):
 
 @dataclass(frozen=True)
 class SpringInAnotherUnit(InAnotherUnit):
-    """A stiffness in N mm/rad, N cm/rad, N m/deg, kgf m/rad or lbf in/rad, or in N m/rad where the others are."""
+    """A stiffness in N mm/rad, N cm/rad, N m/deg, kgf m/rad or lbf in/rad, or in N m/rad if the others are not."""
 
     key: ClassVar[Key] = "spring"
     factors: Mapping[str, float] = field(
@@ -121,7 +121,7 @@ class SpringInAnotherUnit(InAnotherUnit):
 
 @dataclass(frozen=True)
 class SpringDecimal(InAnotherUnit):
-    """A stiffness whose decimal point is one place off."""
+    """A stiffness with its decimal point one place off."""
 
     key: ClassVar[Key] = "spring"
     factors: Mapping[str, float] = field(default_factory=lambda: _DECIMAL)
@@ -129,7 +129,7 @@ class SpringDecimal(InAnotherUnit):
 
 @dataclass(frozen=True)
 class DensityDecimal(InAnotherUnit):
-    """An air density whose decimal point is one place off."""
+    """An air density with its decimal point one place off."""
 
     key: ClassVar[Key] = "density"
     factors: Mapping[str, float] = field(default_factory=lambda: _DECIMAL)
@@ -142,7 +142,7 @@ class TimeInAnotherUnit(Label):
     key: ClassVar[Key] = "clock"
 
     def meant(self, value: float, others: Sequence[float]) -> Iterator[tuple[float, str]]:  # noqa: ARG002
-        """The stamped times over true ones."""
+        """The stamped times over the true times."""
         yield value / 60.0, "in minutes"
         yield value * 60.0, "in seconds, the others in minutes"
         yield value * 1e3, "in milliseconds"
@@ -181,7 +181,7 @@ class SpringOfAnotherRun(OfAnotherRun):
 
 @dataclass(frozen=True)
 class WindOff(Label):
-    """A stated speed with the wind off."""
+    """A stated speed although the wind was off."""
 
     key: ClassVar[Key] = "speed"
     repeats: ClassVar[bool] = False
@@ -282,7 +282,7 @@ def _settings(statements: Statements, key: str) -> list[tuple[int, ...]]:
 
 
 def mending_statements(evidence: SlipEvidence) -> list[Statements]:
-    """Statements with other labels that the frequencies agree with, of the runs that state a spring."""
+    """Statements with other labels that agree with the frequencies, of the runs that state a spring."""
     slips = (WrongLabel(), WrongLabels())
     return [trial.labels for slip in slips for trial, _ in _mended(evidence, slip.trials)[1]]
 
@@ -300,7 +300,8 @@ def _mended(evidence: SlipEvidence, trials: Trials) -> tuple[Statements | None, 
     tried = (
         list(trials(statements, sorted(suspects.tolist()))) if suspects.size and stated.freedom > 0 else []
     )
-    gain = float(chdtri(1, policy.REFUSAL_RATE))  # of one more fitted label
+    # minimum drop of the sum of squares for one more fitted label
+    gain = float(chdtri(1, policy.REFUSAL_RATE))
     mended = []
     for trial in tried:
         found = agreement(trial.labels)
@@ -310,7 +311,7 @@ def _mended(evidence: SlipEvidence, trials: Trials) -> tuple[Statements | None, 
 
 
 def _found(evidence: SlipEvidence, trials: Trials) -> tuple[Remark, ...]:
-    """A refusal that names the runs; none where the statements may be right, or no slip agrees."""
+    """A refusal that names the runs; none if the statements may be right, or no slip agrees."""
     statements, mended = _mended(evidence, trials)
     if statements is None or not mended:
         return ()
@@ -329,7 +330,7 @@ def _found(evidence: SlipEvidence, trials: Trials) -> tuple[Remark, ...]:
 
 
 def _relabelled(statements: Statements, label: Label, places: tuple[int, ...]) -> Iterator[_Trial]:
-    """The campaign with values that may have been meant in some runs, by the same slip in each."""
+    """The campaign with other intended values in some runs, by the same slip in each."""
     values = getattr(statements, label.key)
     others = [float(value) for i, value in enumerate(values.tolist()) if i not in places]
     ids = ", ".join(statements.runs[i].id for i in places)

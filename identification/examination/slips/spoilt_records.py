@@ -1,4 +1,4 @@
-"""Faults of records, seen before any measurement: samples not measured, wraps, steps, standing readings, copies."""
+"""Faults of records, found before any measurement: unmeasured samples, wraps, steps, stuck readings, copies."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.errors import counted
 from tunnel_sim.vocabulary.record import Array, Record
 
-_WORSE = 4.0  # times the sum of squares without the jump
+_WORSE = 4.0  # minimum factor by which the jump increases the sum of squares
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class ClockJumps(RecordSlip):
 
 
 def _jumps(record: Record, at: int) -> bool:
-    """Whether the decay of the longer part goes on in the other part without the jump, and not by the times."""
+    """Whether the longer part's decay continues in the other part if the jump is ignored, and not by the times."""
     longer = slice(None, at + 1) if 2 * at > record.time_s.size else slice(at + 1, None)
     part = Record(record.time_s[longer], record.yaw_rad[longer])
     start = starting_decay(part)
@@ -57,7 +57,7 @@ def _jumps(record: Record, at: int) -> bool:
 
 @dataclass(frozen=True)
 class StandingForMissing(RecordSlip):
-    """A value far from all others, such as -9.99, stands for missing readings. Those samples are left out."""
+    """A value far from all others, such as -9.99, stands for missing readings. These samples are left out."""
 
     def mend(self, campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
         """Leave out these samples of the free decays."""
@@ -80,14 +80,14 @@ class StandingForMissing(RecordSlip):
 
 
 _TURN = 2.0 * np.pi
-#: Of a turn: step between samples, less whole turns. With ten samples per cycle a swing of a tenth of a turn has no
-#: larger steps.
+#: Step between samples, less whole turns, as a share of a turn. With ten samples per cycle a swing of a tenth
+#: of a turn has no larger steps.
 _SMOOTH = 0.1
 
 
 @dataclass(frozen=True)
 class WrappedAngle(RecordSlip):
-    """The reading jumps by whole turns, as an encoder's that restarts; unwrapped it is smooth. It is unwrapped."""
+    """The reading jumps by whole turns, like a restarted encoder's; unwrapped it is smooth. It is unwrapped."""
 
     def mend(self, campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
         """Unwrap records in which all large steps are whole turns, and shift them to the turn of the other runs.
@@ -125,9 +125,10 @@ def _turns(record: Record) -> Array | None:
     return np.concatenate(([0.0], np.cumsum(turns)))
 
 
-_LOOKED_AT = 4  # records: the resolution is common to all
-_OFF_LATTICE = 0.1  # of a step: a reading farther from every multiple of the resolution is not on its lattice
-_UNCHANGED = 1e-4  # of a step: no change
+_LOOKED_AT = 4  # number of records to test: the resolution is common to all
+# share of a step: a reading farther from every multiple of the resolution is not on its lattice
+_OFF_LATTICE = 0.1
+_UNCHANGED = 1e-4  # share of a step: no change
 _MOST = 0.2  # share of the changes off the lattice: a filter or a few outliers may move some
 
 
@@ -136,7 +137,7 @@ class ResolutionTooCoarse(RecordSlip):
     """The readings are far finer than their stated resolution. It is not used: as noise it would hide gaps."""
 
     def mend(self, campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
-        """Drop the resolution where the first records are off its lattice, and smooth or small beside it."""
+        """Drop the resolution if the first records are off its lattice, and smooth or small compared with it."""
         step = campaign.sensor.resolution
         if not step:
             return campaign, ()
@@ -166,23 +167,26 @@ def _off_lattice(yaw: Array, step: float) -> bool:
     )
 
 
-_STUCK = 0.6  # of a cycle
-_MOVING = 0.1  # of the record's range: the swings on both sides of a stuck stretch
-_STANDS = 0.01  # of the record's largest excursion: a constant reading stays as near its last value,
-_NOISE = 5.0  # or within as many standard deviations of its last fiftieth
+_STUCK = 0.6  # minimum duration of a stuck stretch, as a share of a cycle
+_MOVING = 0.1  # share of the record's range: the swings on both sides of a stuck stretch
+# A constant reading stays this close to its last value, as a share of the record's largest excursion,
+# or within this many standard deviations of its last fiftieth.
+_STANDS, _NOISE = 0.01, 5.0
 _LEAST_CYCLES = (
-    0.75  # of standing: at a turning point a swing stays within a hundredth for a twentieth of a cycle
+    # minimum duration of a constant reading: at a turning point a swing stays within a hundredth for a
+    # twentieth of a cycle
+    0.75
 )
-_LEAST_KEPT = 2.0  # cycles of motion before it; their last swings are compared
+_LEAST_KEPT = 2.0  # cycles of motion before the tail; their last swings are compared
 #: Dry friction reduces every swing by the same step and stops the body from a swing of at most one such step;
 #: viscous damping reduces it by a share. A swing of more than three steps does not stop by itself.
 _STEPS = 3.0
-_CLEAR = 5.0  # bands of the constant reading that the last swing must exceed
+_CLEAR = 5.0  # multiple of the band of the constant reading that the last swing must exceed
 
 
 @dataclass(frozen=True)
 class StuckReading(RecordSlip):
-    """The reading keeps one value to the last bit for most of a cycle, between swings. Those samples are left out.
+    """The reading keeps one value to the last bit for most of a cycle, between swings. These samples are left out.
 
     A clipped or coarse reading keeps a value for less than half a cycle, at its turning points.
     """
@@ -208,9 +212,9 @@ class StuckReading(RecordSlip):
 
 
 def stuck_samples(record: Record) -> NDArray[np.bool_] | None:
-    """The samples that repeat one value between swings for `_STUCK` cycles or longer; None where there are none."""
+    """The samples that repeat one value between swings for `_STUCK` cycles or longer; None if there are none."""
     yaw, time = record.yaw_rad, record.time_s
-    starts = np.concatenate(([0], np.flatnonzero(np.diff(yaw)) + 1))  # of stretches of one value
+    starts = np.concatenate(([0], np.flatnonzero(np.diff(yaw)) + 1))  # starts of stretches of one value
     lengths = np.diff(np.concatenate((starts, [yaw.size])))
     longest = int(lengths.max())
     if longest < LEAST_SAMPLES or (frequency := starting_frequency(record)) is None:
@@ -222,7 +226,7 @@ def stuck_samples(record: Record) -> NDArray[np.bool_] | None:
         begin, end = int(starts[place]), int(starts[place] + lengths[place])
         before, after = yaw[max(begin - cycle, 0) : begin], yaw[end : end + cycle]
         if before.size < cycle // 2 or after.size < cycle // 2:
-            continue  # at an end: before the release, or at rest
+            continue  # at an end of the record: before the release, or at rest
         swings = min(float(np.ptp(before)), float(np.ptp(after)))
         if swings > _MOVING * float(np.ptp(yaw)):
             stuck[begin:end] = True
@@ -256,7 +260,7 @@ class ConstantTail(RecordSlip):
 
 
 def standing_from(record: Record) -> int | None:
-    """The first sample of a constant tail after a large swing; None where there is none."""
+    """The first sample of a constant tail after a large swing; None if there is none."""
     yaw, time = record.yaw_rad, record.time_s
     end = yaw[-max(yaw.size // 50, 1) :]
     away = np.abs(yaw - float(np.median(end)))
@@ -274,23 +278,26 @@ def standing_from(record: Record) -> int | None:
         return None
     parts = yaw[at - 2 * cycle : at - cycle], yaw[at - cycle : at]
     before, after = (0.5 * float(np.ptp(part)) for part in parts)
-    falls = 0.5 * (before - after)  # in half a cycle
+    falls = 0.5 * (before - after)  # fall of the swing in half a cycle
     return at if after > max(_STEPS * falls, _CLEAR * band) else None
 
 
 Spectrum = NDArray[np.complex128]
-_ORDER = 6  # of the difference: the motion of ten samples per cycle is reduced to a twentieth of its size
-_BLOCK = 50  # differences scaled to one size: ringing after the release must not outweigh the noise
-_LEAST = 500  # differences in common: the best correlation of pure noise over all shifts is then 0.3
+_ORDER = 6  # order of the difference: it reduces a motion of ten samples per cycle to a twentieth of its size
+# blocks of differences, scaled to one size: ringing after the release must not outweigh the noise
+_BLOCK = 50
+# minimum number of common differences: the best correlation of pure noise over all shifts is then 0.3
+_LEAST = 500
 #: Correlation from which two noises are one. With added noise of the same size it is 0.7; with rounding to two
 #: standard deviations of the noise, 0.87.
 _SAME = 0.7
-_ALONE = 0.5  # of the correlation: greatest at any other shift; hum common to two runs exceeds it
-_NEAR = 12  # shifts about the best that the differencing itself correlates
-_THINNED = (2, 3, 4)  # of this many samples one is kept
+# maximum correlation at any other shift, as a share of the best; hum common to two runs exceeds it
+_ALONE = 0.5
+_NEAR = 12  # shifts near the best that the differencing itself correlates
+_THINNED = (2, 3, 4)  # one sample of this many is kept
 _SAME_RATE = 1e-3
-_MOST_PAIRS = 1500  # half a second of comparisons
-_ROUNDING = 1e-9  # of the largest reading: smaller differences are rounding errors
+_MOST_PAIRS = 1500  # maximum number of comparisons, half a second
+_ROUNDING = 1e-9  # share of the largest reading: smaller differences are rounding errors
 
 
 @dataclass(frozen=True)
@@ -335,7 +342,7 @@ def _equal(campaign: Campaign) -> Iterator[tuple[Run, Run, str]]:
 
 
 def _alike(campaign: Campaign) -> Iterator[tuple[Run, Run, str]]:
-    """Free decays with the noise of an earlier run, among those nearest in size and length."""
+    """Free decays with the noise of an earlier run, among the runs nearest in size and length."""
     free = [run for run in campaign.decays if run.record.yaw_rad.size > _LEAST]
     order = sorted(free, key=lambda run: float(np.std(run.record.yaw_rad)))
     reach = max(1, _MOST_PAIRS // max(len(free), 1))
@@ -356,7 +363,7 @@ def _alike(campaign: Campaign) -> Iterator[tuple[Run, Run, str]]:
 
 
 def _thinned_correlation(run: Run, other: Run, size: int) -> float:
-    """The correlation of a record with every second to fourth sample of a faster one; 0 where neither is faster."""
+    """The correlation of a record with every second to fourth sample of a faster one; 0 if neither is faster."""
     slow, fast = sorted((run, other), key=lambda one: one.record.sample_rate)
     ratio = fast.record.sample_rate / slow.record.sample_rate
     step = round(ratio)
@@ -380,7 +387,7 @@ def _noise(yaw: Array) -> Array:
 
 
 def _correlation(one: Spectrum, other: Spectrum, samples: int, size: int) -> float:
-    """The correlation of two spectra's series at the best shift; 0 where another shift is as good."""
+    """The correlation of two series, given by their spectra, at the best shift; 0 if another shift is as good."""
     series = irfft(one * np.conj(other), size) / max(samples, 1)
     best = int(np.argmax(np.abs(series)))
     found = float(series[best])

@@ -21,19 +21,19 @@ class MotionGrows(StatementSlip):
     """Motion that grows with the wind off. Refused."""
 
     def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
-        """As `growing_runs`."""
+        """As in `growing_runs`."""
         return growing_runs(evidence.swings)
 
 
 @dataclass(frozen=True)
 class EqualStatementsDiffer(StatementSlip):
-    """Runs of equal spring, wind and swing differ in frequency or damping as never under one condition. Refused.
+    """Runs of equal spring, wind and swing differ in frequency or damping more than under one condition. Refused.
 
-    This includes labels copied from run to run. The values on which the runs would agree are not known.
+    This includes labels copied from run to run. The values with which the runs would agree are not known.
     """
 
     def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
-        """Compare the runs that state the same, with equal amplitudes."""
+        """Compare the runs with equal statements and equal amplitudes."""
         groups: dict[tuple[float | None, ...], list[Swing]] = defaultdict(list)
         setting = speed_groups(swing.run.wind_speed for swing in evidence.swings)
         for swing in evidence.swings:
@@ -62,7 +62,7 @@ class EqualStatementsDiffer(StatementSlip):
 
 
 def _apart(low: Swing, high: Swing) -> tuple[float, float]:
-    """Least differences of stiffness and damping of two runs, in logarithms; 0 where their swings are unlike."""
+    """Least differences of stiffness and damping of two runs, in logarithms; 0 if their swings are unlike."""
     sizes = sorted((low.amplitude, high.amplitude))
     if low is high or sizes[0] < policy.EQUAL_SWINGS * sizes[1]:
         return 0.0, 0.0
@@ -119,7 +119,7 @@ def _changes(swings: tuple[Swing, ...]) -> list[_Change]:
 
 @dataclass(frozen=True)
 class WindNotSeen(StatementSlip):
-    """No wind-on run differs from the wind-off runs of its spring, though records would show it. Asked about."""
+    """No wind-on run differs from the wind-off runs of its spring, but records would show it. Asked about."""
 
     def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
         """Compare frequency and decay rate with the wind on and off."""
@@ -154,7 +154,7 @@ class WindExchanged(StatementSlip):
     """
 
     def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
-        """Exchange wind on and off in all runs, where there is one speed."""
+        """Exchange wind on and off in all runs, if there is one speed."""
         swings = tuple(s for s in evidence.swings if s.run.spring_stiffness)
         speeds = set(speed_groups(s.run.wind_speed for s in swings if s.run.wind_on).values())
         changes = _changes(swings)
@@ -181,7 +181,7 @@ class WindExchanged(StatementSlip):
 _KEEP = "or state plausible = false under [sensor]"
 _SLENDER = 12.0  # Izz of a uniform rod of mass m and length l is m l²/12
 
-#: Apparent density over the true one where a value is in another unit.
+#: Ratios of apparent to true density for a value in another unit.
 _OF_DENSITY = {
     "spring_stiffness in N mm/rad": 1e3,
     "spring_stiffness in N cm/rad": 1e2,
@@ -200,7 +200,7 @@ class YawMomentTooLarge(StatementSlip):
     """|Cnβ| too large for any body: a stiffness, a speed or a size in a wrong unit. Asked about."""
 
     def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
-        """Compare Cnβ of the runs with the greatest."""
+        """Compare the Cnβ of the runs with the greatest known value."""
         area, length = evidence.campaign.rig.frontal_area, evidence.campaign.rig.reference_length
         swings = [s for s in evidence.swings if s.run.spring_stiffness]
         windy = [s.run.id for s in swings if s.run.wind_on]
@@ -226,9 +226,9 @@ class YawMomentTooLarge(StatementSlip):
 
 @dataclass(frozen=True)
 class InertiaOfNoBody(StatementSlip):
-    """An inertia, by the springs, that a body of the stated sizes cannot have. Asked about, with the likely slips.
+    """An inertia, by the springs, that no body of the stated sizes can have. Asked about, with the likely slips.
 
-    A stated inertia is compared instead where there is one: it is closer.
+    If an inertia is stated, it is compared instead: it is more accurate.
     """
 
     def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
@@ -254,5 +254,5 @@ class InertiaOfNoBody(StatementSlip):
 
 
 def _judged(evidence: SlipEvidence) -> bool:
-    """Whether sizes are judged: not where the campaign states that they are right, or the joint slides."""
+    """Whether sizes are judged: not if the campaign states that they are right, or the joint slides."""
     return evidence.campaign.sensor.plausible is not False and evidence.campaign.law is None

@@ -41,7 +41,7 @@ from identification.examination.slips.statements import (
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign
 
-#: Sought in the records as given.
+#: Slips to be found in the records as given.
 RECORD_SLIPS: tuple[RecordSlip, ...] = (
     StandingForMissing(),
     ClockJumps(),
@@ -52,7 +52,7 @@ RECORD_SLIPS: tuple[RecordSlip, ...] = (
     StuckReading(),
 )
 
-#: Sought in the measured oscillations; the search ends at the first refusal.
+#: Slips to be found in the measured oscillations; the search ends at the first refusal.
 STATEMENT_SLIPS: tuple[StatementSlip, ...] = (
     MotionGrows(),
     AngleInDegrees(),
@@ -90,7 +90,7 @@ def mended(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
 
 
 def found_in(evidence: SlipEvidence) -> tuple[Remark, ...]:
-    """Remarks on the statements that the measured oscillations contradict; only the refusal where there is one."""
+    """Remarks on the statements that the measured oscillations contradict; only the refusal if there is one."""
     remarks: tuple[Remark, ...] = ()
     with np.errstate(all="ignore"):
         for slip in STATEMENT_SLIPS:

@@ -1,7 +1,8 @@
 """Blind tests: campaigns with their truth in a sealed key, hashed answers, and the score.
 
-`make_blind` draws campaigns with the reference simulator (another integrator and other forms of the effects than
-in the fits), `answer_set` diagnoses them without the key, `score_set` checks all hashes, opens the key and counts.
+`make_blind` draws campaigns with the reference simulator (another integrator and other forms of the effects
+than in the fits), `answer_set` diagnoses them without the key, `score_set` checks all hashes, opens the key and
+counts.
 """
 
 from tunnel_lab.experiments.blind.answers import answer_set, answers_folder

@@ -40,9 +40,9 @@ ANSWERS = "answers"
 
 
 def answers_folder(folder: Path, excluded: Sequence[str] = (), effects_file: Path | None = None) -> Path:
-    """The folder of the answers to a set: ``answers`` in it, or ``answers-without-…-with-…``.
+    """The folder of the answers to a set: its subfolder ``answers``, or ``answers-without-…-with-…``.
 
-    The latter ends with a hash of the file of added effects.
+    The latter name ends with a hash of the file of added effects.
     """
     without = ["without", *sorted(set(excluded))] if excluded else []
     names = sorted(kind.name for kind in _own_effects(effects_file))
@@ -68,7 +68,7 @@ class Sealed:
     hashes: dict[str, str] = field(default_factory=dict)
 
     def finished(self) -> set[str]:
-        """Campaigns that are answered.
+        """Campaigns with an answer.
 
         Raises:
             TunnelError: when an answer was changed afterwards.
@@ -107,8 +107,8 @@ def answer_set(
 
     Args:
         excluded: effects withheld from the vocabulary.
-        workers: None: this process.
-        progress: called with the number of campaigns answered and the total.
+        workers: workers; None: this process.
+        progress: function called with the number of answered campaigns and the total.
         effects_file: file of effects added to the vocabulary; None: none.
 
     Returns:
@@ -131,7 +131,7 @@ def scored(document: Mapping[str, Any], where: str) -> ScoredAnswer:
     """The answer in a document of `answer_campaign`.
 
     Args:
-        where: it is from, in an error.
+        where: source of the document, for an error.
 
     Raises:
         TunnelError: when it is not an answer.
@@ -150,8 +150,8 @@ def answer_campaign(folder: Path, excluded: Sequence[str] = (), effects_file: Pa
     """Diagnose one campaign of a set.
 
     Returns:
-        Its answer: the diagnosis' JSON document with ``wall_s`` (s) and ``data_sha256``, or, where there is none,
-        ``causes`` null and the ``error``.
+        The answer: the diagnosis' JSON document with ``wall_s`` (s) and ``data_sha256``; without a diagnosis,
+            ``causes`` is null and ``error`` has the reason.
     """
     begun = time.perf_counter()
     try:

@@ -60,11 +60,11 @@ class ScoredAnswer:
     Args:
         causes: effect names; None: there is no answer.
         ambiguous_with: effects that the runs cannot distinguish from the causes.
-        probabilities: of the answers weighed, by their effects.
-        decision: on these; None where there are none.
+        probabilities: probabilities of the weighed answers, by their effects.
+        decision: decision on these answers; None if there is none.
         inclusion: by effect, the probability that it is a cause.
         before: coefficients of the nominal model, by name.
-        after: with the causes.
+        after: coefficients with the causes.
         spreads: scatter between the runs.
         closed: share of the gap that the causes close.
         seconds: time that the answer took, s; None: not known.
@@ -104,9 +104,9 @@ class TrueScatter:
 
     Args:
         widths: standard deviation between runs by quantity, relative; empty where the runs repeat.
-        level: of the widths, such as ``small``; empty where the truth does not state it.
-        form: of the distribution.
-        stated: by the campaign, relative, by quantity; empty for nothing.
+        level: level of the widths, such as ``small``; empty if the truth does not state it.
+        form: form of the distribution.
+        stated: scatter stated by the campaign, relative, by quantity; empty for nothing.
     """
 
     widths: Mapping[str, float] = field(default_factory=dict)
@@ -120,9 +120,9 @@ class CoefficientError:
     """An estimate minus the truth.
 
     Args:
-        stds: in stated standard deviations.
-        share: of the truth.
-        covered: whether the stated 95 % interval holds the truth.
+        stds: error in stated standard deviations.
+        share: error as a share of the truth.
+        covered: whether the stated 95 % interval contains the truth.
     """
 
     stds: float
@@ -135,19 +135,19 @@ class Case:
     """One campaign.
 
     Args:
-        truth: its effects, sorted; ``("unknown",)`` outside the vocabulary, empty for none.
-        withheld: whether one of its effects was excluded from the vocabulary, which makes the truth unknown.
+        truth: true effects, sorted; ``("unknown",)`` outside the vocabulary, empty for none.
+        withheld: whether one of these effects was excluded from the vocabulary, so that the truth is unknown.
         severity: excess of the nominal model as a ratio to the noise variance; None where the truth does not state
             it.
-        coefficients: true ``cn_beta`` and ``cn_r``, 1/rad; in phase with angle and rate where a lag of the
-            air acts that the answer does not name (decision 0004).
+        coefficients: true ``cn_beta`` and ``cn_r``, 1/rad. If a lag of the air acts that the answer does not
+            name, they are in phase with angle and rate (decision 0004).
         answer: the scored part of the diagnosis.
         small: effects that act but need not be found, sorted.
         time_scale: time over the standard rig's, a ratio.
         few_runs: whether the protocol has few springs and speeds.
         coloured: whether the sensor's noise is coloured.
         stamps: ``even``, ``rounded`` or ``jittered``.
-        scatter: differences between its runs, beside the causes.
+        scatter: differences between the runs, beside the causes.
     """
 
     name: str
@@ -184,7 +184,7 @@ class Case:
 
     @property
     def right(self) -> bool:
-        """Whether the causes are exactly the true ones; small ones may be among them."""
+        """Whether the causes are exactly the true ones; small effects may be among them."""
         return self.causes is not None and set(self.causes) - set(self.small) == set(self.truth)
 
     @property
@@ -222,12 +222,12 @@ class Case:
 
     @property
     def probability(self) -> float | None:
-        """Probability of the answer given; None where it is not among the candidates."""
+        """Probability of the given answer; None if it is not among the candidates."""
         return self.answer.probabilities.get(" + ".join(self.answer.causes or ()) or "none")
 
     @property
     def decision(self) -> Decision | None:
-        """Whether the answer is decided, and the smallest set of likely ones; None where there is no answer."""
+        """Whether the answer is decided, and the smallest set of likely answers; None if there is no answer."""
         return self.answer.decision
 
     @property
@@ -238,7 +238,7 @@ class Case:
 
     @property
     def covered(self) -> bool | None:
-        """Whether the true causes are in the smallest set of likely answers; None where there is no answer."""
+        """Whether the true causes are in the smallest set of likely answers; None if there is no answer."""
         found = self.decision
         if found is None:
             return None
@@ -268,7 +268,7 @@ def case(name: str, truth: Mapping[str, Any], said: ScoredAnswer, excluded: Sequ
         excluded: effects withheld from the vocabulary; a truth with one of them is ``unknown``.
 
     Raises:
-        ValueError: when the truth is malformed (pydantic's, with the place).
+        ValueError: when the truth is malformed (pydantic's error, with the place).
     """
     stated = _Truth.model_validate(truth)
     effects = tuple(sorted(stated.effects))
@@ -306,7 +306,7 @@ def label(names: Sequence[str] | None) -> str:
 
 
 MIDDLE = (1.0 / 3.0, 3.0)
-"""Time scales of the middle rigs: about a third of those drawn evenly in the logarithm from 1/30 to 30."""
+"""Time scales of the middle rigs: about a third of the scales, drawn evenly in the logarithm from 1/30 to 30."""
 
 GROUPS: dict[str, Callable[[Case], bool]] = {
     "none acts": lambda c: c.number == 0,
@@ -341,13 +341,14 @@ class CausesFound:
     """Success in finding the causes of some campaigns.
 
     Args:
-        group: of campaigns.
-        exact: campaigns whose causes are exactly right.
+        group: group of campaigns.
+        exact: campaigns with exactly right causes.
         found: proportion of the relevant true causes that are named.
         false: proportion of the named causes that do not act. Small causes that act do not count.
         stated_wrongly: campaigns with a decided answer that names a wrong set.
-        covered: campaigns whose true causes are in the smallest set of answers that together have 0.9.
-        credible_size: mean number of answers in these sets; 0 where there are none.
+        covered: campaigns with the true causes in the smallest set of answers that together have probability
+            0.9.
+        credible_size: mean number of answers in these sets; 0 if there are none.
     """
 
     group: str

@@ -1,4 +1,4 @@
-"""Success in finding scatter between runs: named or not, rightly or falsely, and how wide."""
+"""Success in finding scatter between runs: whether it is named rightly or falsely, and its width."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ class FoundScatter:
     Args:
         number: ``wind_speed``, ``spring_stiffness``, ``mechanical_damping`` or ``all``.
         named: share of the cases with unstated scatter in which it is named.
-        false: share of the cases with named scatter in which there is none.
+        false: share of the cases with named scatter that have none.
         within: share of the cases with unstated scatter in which the width is right within a factor of 1.5.
-        covered: share of the widths with an interval of 90 % in which it includes the true width.
+        covered: share of the widths with a 90 % interval that contains the true width.
     """
 
     number: str
@@ -46,7 +46,7 @@ class ScatterScore:
     Args:
         by_number: for each quantity, then for all together.
         named_alone: scatter and no cause named, of campaigns without a cause and with unstated scatter.
-        no_gap: nothing named, of campaigns without a cause and with scatter as stated.
+        no_gap: no effect named, of campaigns without a cause and with scatter as stated.
         false_alarms: scatter named, of campaigns with runs that repeat.
         exact: causes exactly right, of campaigns with runs that scatter; scatter may be named.
         exact_repeating: causes exactly right, of campaigns with runs that repeat.
@@ -70,8 +70,9 @@ class ScatterScore:
 def scatter_score(cases: Sequence[Case]) -> ScatterScore:
     """Count the scatter found.
 
-    Distributions outside the vocabulary, such as a drift, are excluded from campaigns without a cause and from the
-    widths: which part of them is scatter is a matter of convention.
+    Distributions outside the vocabulary, such as a drift, are excluded from campaigns without a cause and from
+    the
+    widths: the part of them that is scatter is a matter of convention.
     """
     scattering = [c for c in cases if c.scatter.widths]
     repeating = [c for c in cases if not c.scatter.widths]

@@ -39,7 +39,7 @@ KINDS = {
     "withheld": "withheld from the vocabulary",
     "all": "all",
 }
-_RIGHT_ANSWER = {"withheld": "unknown"}  # the right answer of the others is their name
+_RIGHT_ANSWER = {"withheld": "unknown"}  # the right answer to any other truth is its name
 _CELL, _NAMES, _RIGHT = 0.19, 1.6, 1.0  # inches: a cell, the row names, the shares
 _DARK = 0.55  # share of the colour above which white text is legible
 
@@ -49,7 +49,7 @@ class ScoreSection(TextTable):
     """A table with a line below it.
 
     Args:
-        note: the line; empty: none.
+        note: line below the table; empty: none.
     """
 
     note: str = ""
@@ -365,8 +365,8 @@ def _share(share: Proportion) -> tuple[str, str, str, str]:
 def calibration_figure(score: BlindScore) -> Drawing:
     """The share of correct statements against their stated probability.
 
-    One panel shows the answers, in bins with Wilson's intervals of 95 %. Another shows the probabilities of each
-    effect being among the causes, without bins, where the answers state these.
+    One panel shows the answers, in bins with Wilson's intervals of 95 %. Another shows, without bins, the
+    probabilities that each effect is among the causes, if the answers state them.
     """
     error, bins = score.calibration()
     inclusion = score.inclusion()
@@ -380,7 +380,7 @@ def calibration_figure(score: BlindScore) -> Drawing:
     label = f"{number} answers, 95 %"
     panels[0].errorbar(mean, share, yerr=spans, fmt="o-", color=AFTER, ms=4, lw=0.8, label=label)
     for bin_of, x, y in zip(bins, mean, share, strict=True):
-        beside = (5, -5 if y > x else 5)  # below high points, whose intervals are short
+        beside = (5, -5 if y > x else 5)  # below high points, which have short intervals
         text = str(bin_of.right.total)
         panels[0].annotate(text, (x, y), beside, textcoords="offset points", fontsize=7, va="center")
     panels[0].set(xlabel="stated probability of the answer", ylabel="share of answers that are right")

@@ -37,7 +37,7 @@ from tunnel_sim.vocabulary.errors import TunnelError, counted, shown
 from tunnel_sim.vocabulary.record import Array
 
 BINS = 10
-_CLOSED = 0.95  # of the gap, from which a case counts as closed: a convention
+_CLOSED = 0.95  # share of the gap from which a case counts as closed: a convention
 
 
 @dataclass(frozen=True)
@@ -45,9 +45,9 @@ class CalibrationBin:
     """Answers of similar probability.
 
     Args:
-        low: end of the bin, probability.
-        high: other end, probability.
-        mean: their mean probability.
+        low: lower end of the bin, a probability.
+        high: upper end of the bin, a probability.
+        mean: mean probability of the answers in the bin.
         right: number of right answers.
     """
 
@@ -62,7 +62,8 @@ def calibration(
 ) -> tuple[float, tuple[CalibrationBin, ...]]:
     """Expected calibration error, and the bins that hold any answers.
 
-    The error is the mean over answers of |share right − mean probability| by bins of equal width; 0 for no answers.
+    The error is the mean over answers of |share right − mean probability| by bins of equal width; 0 without
+    answers.
     """
     p, hit = np.asarray(probabilities, dtype=float), np.asarray(right, dtype=bool)
     if p.size == 0:
@@ -80,7 +81,7 @@ def calibration(
 
 _POINTS = 401
 _WIDTHS = (0.005, 1.0)
-_CLOSE = 1e-9  # of the width
+_CLOSE = 1e-9  # relative tolerance of the width
 _RESAMPLES = 500
 _LEAST_WEIGHT = 1.0  # the curve is drawn where the kernel covers at least one statement
 
@@ -91,12 +92,12 @@ class SmoothCalibration:
 
     Args:
         error: smooth calibration error, a probability.
-        interval: of 95 %, by resampling campaigns at the width found.
-        width: standard deviation of the kernel, equal to the resulting error, a probability.
+        interval: interval of 95 %, by resampling campaigns at the width found.
+        width: standard deviation of the kernel, chosen to equal the resulting error, a probability.
         stated: probabilities of the curve, shape (points,).
-        observed: share of true statements there, shape (points,).
-        low: lower end of its interval of 95 %, shape (points,).
-        high: upper end, shape (points,).
+        observed: share of true statements at these probabilities, shape (points,).
+        low: lower end of the 95 % interval of this share, shape (points,).
+        high: upper end of this interval, shape (points,).
         statements: number of statements.
         campaigns: number of campaigns.
     """
@@ -123,7 +124,7 @@ def smooth_calibration(groups: Sequence[tuple[Sequence[float], Sequence[bool]]])
     """Smooth calibration error of statements in groups; None without any.
 
     Args:
-        groups: by campaign, stated probabilities and whether each is true.
+        groups: stated probabilities by campaign, and whether each statement is true.
     """
     if not groups:
         return None
@@ -173,7 +174,7 @@ def _error(kernel: Array, surplus: Array, number: float) -> float:
 
 
 def _curve(kernel: Array, counts: Array, surplus: Array, grid: Array) -> Array:
-    """Share of true statements by kernel regression: the probability plus the mean surplus there."""
+    """Share of true statements by kernel regression: the stated probability plus the local mean surplus."""
     return np.clip(grid + kernel @ surplus / np.maximum(kernel @ counts, 1e-300), 0.0, 1.0)
 
 
@@ -182,11 +183,11 @@ class CoefficientErrors:
     """Errors of one coefficient over some campaigns.
 
     Args:
-        group: of campaigns.
+        group: group of campaigns.
         name: ``cn_beta`` or ``cn_r``.
         when: ``before`` or ``after`` the causes are added.
-        covered: number of 95 % intervals that hold the truth.
-        spread: root mean square of the errors in stated standard deviations, 1 where these are right.
+        covered: number of 95 % intervals that contain the truth.
+        spread: root mean square of the errors in stated standard deviations; 1 for right standard deviations.
         median: median absolute error as a share of the truth.
     """
 
@@ -205,9 +206,9 @@ class BlindScore:
     Args:
         cases: truth and answer of every campaign.
         excluded: effects withheld from the vocabulary.
-        key_sha256: hash of the key, as published before; empty for an open set.
-        answers_sha256: hash over the answers, as published before the key was opened.
-        made_with: arguments of `make_blind`; empty where unknown.
+        key_sha256: published hash of the key; empty for an open set.
+        answers_sha256: hash over the answers, published before the key was opened.
+        made_with: arguments of `make_blind`; empty if unknown.
         sealed: whether the truth was sealed; else it was beside the data, and the test is not blind.
     """
 
@@ -270,7 +271,7 @@ class BlindScore:
         return counts
 
     def calibration(self) -> tuple[float, tuple[CalibrationBin, ...]]:
-        """Expected calibration error of the probability of the answer given, and its table."""
+        """Expected calibration error of the given answer's probability, and its table."""
         given = [(c.probability, c.right) for c in self.cases]
         known = [(p, right) for p, right in given if p is not None]
         return calibration([p for p, _ in known], [right for _, right in known])
@@ -280,15 +281,15 @@ class BlindScore:
         return found_by_group(self.cases)
 
     def inclusion(self) -> SmoothCalibration | None:
-        """Calibration of the probability of each effect to be among the causes; None where not stated."""
+        """Calibration of the probability that each effect is among the causes; None if not stated."""
         return smooth_calibration(inclusions(self.cases))
 
     def false_alarms(self) -> Proportion:
-        """Proportion of campaigns without a gap whose answer has a cause, ``unknown`` included."""
+        """Proportion of campaigns without a gap for which the answer has a cause, including ``unknown``."""
         return Proportion.of([not c.right for c in self.cases if c.kind == "none"])
 
     def missed(self) -> Proportion:
-        """Proportion of campaigns with a gap whose answer is ``none``."""
+        """Proportion of campaigns with a gap for which the answer is ``none``."""
         return Proportion.of([c.causes == () for c in self.cases if c.kind != "none"])
 
     def rivals(self) -> Proportion:
@@ -389,12 +390,12 @@ def score_set(
 
     Args:
         excluded: effects withheld when the set was answered.
-        key: file of the key; the set's own when None.
+        key: file of the key; None: the set's own.
         effects_file: file of added effects with which the set was answered; None: none.
 
     Raises:
-        TunnelError: when a campaign is not answered, key, campaign or answer does not match its hash, or one of
-            them is malformed.
+        TunnelError: when a campaign is not answered, or when a key, campaign or answer does not match its hash
+            or is malformed.
     """
     campaigns = campaign_folders(folder)
     answers, answers_sha256 = _checked_answers(folder, campaigns, excluded, effects_file)

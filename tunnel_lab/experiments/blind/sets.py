@@ -83,7 +83,7 @@ def campaign_folders(folder: Path) -> list[Path]:
 
 
 CHUNK = 100
-"""Campaigns simulated together: their runs advance in one array, so fewer at a time would cost as much."""
+"""Number of campaigns simulated together: their runs advance in one array, so fewer would cost as much."""
 
 
 def make_blind(
@@ -97,18 +97,18 @@ def make_blind(
     progress: Progress | None = None,
     show_steps: bool = False,
 ) -> Path:
-    """Draw, simulate and write campaigns whose truth is only in the key, and return the key's file.
+    """Draw, simulate and write campaigns with their truth only in the key, and return the key's file.
 
     The key begins with 32 random bytes (the salt), so that the truth cannot be guessed from the published hash;
-    the hash proves that the key was not changed later. The seed is in the key too, since the truth follows from
-    it.
+    the hash proves that the key was not changed later. The seed is also in the key, because the truth follows
+    from it.
 
     Args:
-        seed: of all random draws; the same arguments give the same campaigns.
-        shares: weight of each kind of campaign, of `tunnel_reference.draw.KINDS`.
+        seed: seed of all random draws; equal arguments give equal campaigns.
+        shares: weight of each kind of campaign in `tunnel_reference.draw.KINDS`.
         mixture: shares of other forms, other circumstances and small effects.
-        key: file of the key; inside the folder, beside the campaigns, when None.
-        progress: called with the number of campaigns written and the total.
+        key: file of the key; None: inside the folder, beside the campaigns.
+        progress: function called with the number of campaigns written and the total.
         show_steps: report the sizing of the effects on standard error.
 
     Raises:

@@ -1,6 +1,6 @@
 """The choices of an import in words: for a recipe, for a field of a page, and for an option of the command line.
 
-The command line answers before pydantic is loaded, so the words are here and not in `ImportChoices`.
+The command line answers before pydantic is loaded, so these words are not in `ImportChoices`.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from tunnel_sim.vocabulary.freedom import OWN_INPUT_COLUMNS
 
 @dataclass(frozen=True)
 class ChoiceOption:
-    """A choice of an import, None where it is found from the files.
+    """A choice of an import; None: it is found from the files.
 
     Args:
-        group: of options in the help.
-        wanted: its values, for the remedy ``give <key> as <wanted>``.
-        help: of its option, which has the name of the choice; it begins with the title of its field on a page.
-        metavar: of its option; empty: its type.
-        kind: type of the value, or of each value where it may have several.
+        group: group of options in the help.
+        wanted: words for its values, for the remedy ``give <key> as <wanted>``.
+        help: help of the option with the name of the choice; it begins with the title of its field on a page.
+        metavar: metavariable of the option; empty: its type.
+        kind: type of the value, or of each value if it may have several.
     """
 
     group: Literal["Columns", "Units", "Conditions", "Runs"]
@@ -35,7 +35,7 @@ class ChoiceOption:
 
     @property
     def title(self) -> str:
-        """Of its field on a page."""
+        """Title of the field on a page."""
         return re.split(r"[,:.]", self.help, maxsplit=1)[0]
 
 

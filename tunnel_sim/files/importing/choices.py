@@ -1,4 +1,4 @@
-"""The user's statements about files before an import, as options or in ``import.toml``: how each step decides."""
+"""The user's statements about files before an import, as options or in ``import.toml``: one for each decision."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ class ImportChoices(StrictModel):
     def stretch_of(self, file: str, run: str) -> Stretch:
         """The statement on start, end and rest of a run in its file."""
         found = (one for one in self.stretches if one.file in (file, None) and one.run == run)
-        # A file may have a name that a recipe cannot express: there is then no statement about it.
+        # A file may have a name that a recipe cannot express: then there is no statement about it.
         return next(found, Stretch.model_construct(file=file, run=run))
 
 
@@ -116,7 +116,7 @@ class Recipe(StrictModel):
 
 
 def read_recipe(path: Path) -> ImportChoices:
-    """The choices of an earlier import, from its ``import.toml`` or the campaign's folder with it."""
+    """The choices of an earlier import, from its ``import.toml`` or the folder of its campaign."""
     path = path / IMPORT_RECIPE if path.is_dir() else path
     missing = f"an import writes {IMPORT_RECIPE} into its campaign; name that file"
     return read_document(Recipe, path, missing=missing).choices
@@ -131,7 +131,7 @@ def option_number(text: str, where: str, fits: Callable[[float], bool] = lambda 
     """A number with a decimal point, or with a decimal comma.
 
     Args:
-        fits: whether a value can be meant where a comma may also separate thousands.
+        fits: whether a value is possible, for a comma that may also separate thousands.
 
     Raises:
         ValueError: for a text that is not a number.
@@ -182,7 +182,7 @@ def parse_times(words: Sequence[str], option: str) -> dict[str, float]:
     """Times in s by run, under the empty name for all files, from words ``SECONDS`` or ``RUN=SECONDS``.
 
     Raises:
-        TunnelError: for a word of another form.
+        TunnelError: for a word of any other form.
     """
     times = {}
     for word in words:
@@ -201,7 +201,7 @@ def parse_setting(text: str, where: str) -> tuple[Conditions, StatedBy]:
     Numbers may have a decimal comma.
 
     Raises:
-        TunnelError: for a text of another form, or a unit that does not measure the condition.
+        TunnelError: for a text of any other form, or a unit that does not measure the condition.
     """
     numbers: dict[str, float] = {}
     names: dict[str, str] = {}

@@ -16,20 +16,20 @@ from tunnel_sim.vocabulary.errors import TunnelError, counted
 from tunnel_sim.vocabulary.quantities import PerSample, Readings, Seconds, Times
 from tunnel_sim.vocabulary.record import Array
 
-_COARSE = 0.1  # share of samples with the stamp of the previous one, above which the stamps are too coarse
-_UNEVEN = 0.01  # of a step
+_COARSE = 0.1  # share of samples with the stamp of the previous sample above which the stamps are too coarse
+_UNEVEN = 0.01  # share of a step
 _FINEST = 1e-12  # s
-_RESTARTS = 0.01  # share of backward steps, up to which the clock restarts and the rows are not out of order
+_RESTARTS = 0.01  # share of backward steps up to which the clock restarts and the rows are not out of order
 _FEW_RESTARTS = 3  # in a short record
 _FEW = 0.1  # share of rows out of order that a logger may mix up; more of them are several runs
 _SMOOTH = 0.1  # white noise in a smooth reading, relative to its swing
-_ROUNDED = 1e-9  # of the range: readings that differ by less are equal
+_ROUNDED = 1e-9  # share of the range: readings that differ by less are equal
 _FLAT = 3  # samples: a shorter peak may be flat by chance
-_FLATTER = 5  # times as many samples as on the level below: a parabola has at most 2.4 times as many
-_GAP = 1.75  # usual steps: samples are missing
-_LEVELS_OF = 200_000  # samples of each run that are inspected
+_FLATTER = 5  # ratio of samples at the last level to the level below: a parabola reaches at most 2.4
+_GAP = 1.75  # multiple of the usual step: samples are missing
+_LEVELS_OF = 200_000  # number of inspected samples of each run
 _MOST_LEVELS = 20_000
-_ON_LEVEL = 0.2  # of a level's height
+_ON_LEVEL = 0.2  # share of a level's height
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class Cleaned:
 
     Args:
         time_s: increasing, from zero on.
-        rows: the row of each sample in the record as it was, shape (n,).
+        rows: the row of each sample in the original record, shape (n,).
         first_s: time of the first sample by the file's clock.
     """
 
@@ -55,7 +55,7 @@ class Cleaned:
 
 
 def restarts(time: Times) -> list[int]:
-    """Indices where the times restart because another run follows; empty: nowhere.
+    """Indices at which the times restart because another run follows; empty: none.
 
     Rows without a time, such as a blank line or a repeated heading between two runs, do not hide a restart.
     """
@@ -66,7 +66,7 @@ def restarts(time: Times) -> list[int]:
         return []
     starts = [0, *back.tolist(), clock.size]
     parts = [clock[a:b] for a, b in itertools.pairwise(starts)]
-    # Another run begins near the time at which the first one began, and not slightly before the previous row.
+    # another run begins near the time of the first start, and not slightly before the previous row
     early = all(part[0] - clock[0] <= 0.1 * np.ptp(parts[0]) for part in parts[1:])
     if not early and not _interleaved(clock, starts):
         return []
@@ -84,10 +84,10 @@ def _interleaved(clock: Times, starts: Sequence[int]) -> bool:
 
 
 def cleaned(time: Times, reading: Readings) -> Cleaned:
-    """Times and readings as recorded in the form of a campaign.
+    """Recorded times and readings in the form of a campaign.
 
     Raises:
-        TunnelError: where the rows are in no order of one run, which sorting would invent.
+        TunnelError: when the rows have no order of a single run: sorting would invent one.
     """
     remarks: list[str] = []
     rows = np.flatnonzero(np.isfinite(time) & np.isfinite(reading))
@@ -152,7 +152,7 @@ def _of_clock(time: Times) -> list[str]:
 
 
 def _out_of_order(time: Times) -> int:
-    """The least number of rows that are moved if the rows are sorted."""
+    """The least number of rows that move when the rows are sorted."""
     tails: list[float] = []
     for value in time.tolist():
         place = bisect_right(tails, value)
@@ -164,12 +164,12 @@ def _of_one_run(time: Times, reading: Readings) -> bool:
     """Whether sorted rows are one run, however mixed up they were: an even clock, and a reading without jumps."""
     steps = np.diff(time)
     even = np.abs(steps - np.median(steps)).max() <= _UNEVEN * np.median(steps)
-    jumps = np.diff(reading, 4)  # of two runs between each other: as large as their distance
+    jumps = np.diff(reading, 4)  # between samples of two runs they are as large as the distance of the runs
     return bool(even and jumps.size and np.sqrt(np.mean(jumps**2) / 70.0) <= _SMOOTH * reading.std())
 
 
 def _spread(time: Times, rows: NDArray[np.intp]) -> Times:
-    """Evenly spaced times from each gap in coarse stamps to the next one; a missing row keeps its time."""
+    """Times spread evenly from each gap in coarse stamps to the next gap; a missing row keeps its time."""
     firsts = np.concatenate([[0], np.flatnonzero(np.diff(time)) + 1])
     coarse = np.diff(time[firsts])
     gaps = firsts[1:][coarse > _GAP * np.median(coarse)]
@@ -186,7 +186,7 @@ def clock_text(time: Seconds) -> str:
 
 
 def from_zero(time: Times) -> Times:
-    """Times from the first sample on, without the extra digits of a subtraction."""
+    """Times from the first sample on, without the spurious digits of a subtraction."""
     if time.size < 2 or time[0] == 0.0:
         return time
     step = float(np.ptp(time)) / (time.size - 1)
@@ -199,7 +199,7 @@ def from_rest(reading: PerSample, rest: float, unit: str, where: str) -> tuple[P
     """A reading without its value at rest, and a remark.
 
     Args:
-        rest: as stated, in the unit of the reading.
+        rest: stated reading at rest, in the unit of the reading.
     """
     least, most = float(reading.min()), float(reading.max())
     if not least <= rest <= most:
@@ -226,9 +226,10 @@ def resolution(readings: Sequence[PerSample]) -> float | None:
 
 
 def clipped(reading: PerSample) -> list[tuple[float, NDArray[np.intp]]]:
-    """The limits of a sensor that cuts off the peaks of a swing: each with the samples at it.
+    """The limits of a sensor that cuts off the peaks of a swing, each with the samples at it.
 
-    A reading that turns freely is not longer at its last level than at the one before, a few times at most.
+    A reading that turns freely does not stay longer at its last level than at the level before, except a few
+    times.
     """
     found = []
     for sign in (1.0, -1.0):

@@ -30,7 +30,7 @@ _ACCELERATION = re.compile(
     r"acceleration|beschleunigung|ddot|[βθψφ]̈|(?<![a-z])(angacc|acc|acce?l)(?![a-z])", re.IGNORECASE
 )
 _JOINED = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
-"""Between the words of a name that are joined, such as ``xGyro`` or ``ZGyro``."""
+"""Word boundaries in a name that joins words, such as ``xGyro`` or ``ZGyro``."""
 OTHER = re.compile(
     r"(?<![a-z])(index|idx|sample|samples|nr|no|row|#|frame|temperature|current|force)(?![a-z])", re.I
 )
@@ -50,7 +50,7 @@ _VOLTAGE = re.compile(
 
 
 def names_voltage(name: str) -> bool:
-    """Whether a name means a voltage, or a channel of a converter or an oscilloscope."""
+    """Whether a name denotes a voltage, or a channel of a converter or an oscilloscope."""
     return _VOLTAGE.fullmatch(_JOINED.sub("_", name)) is not None
 
 

@@ -1,4 +1,4 @@
-"""The numbers of a column in seconds and radians: by its unit, or by one that is guessed from their size."""
+"""The numbers of a column in seconds and radians: by its unit, or by a unit guessed from their size."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from tunnel_sim.vocabulary.quantities import PerSample, Rows
 
 _COUNTERS = (2.0**8, 2.0**10, 2.0**12, 2.0**14, 2.0**16, 2.0**24, 2.0**32)
 _TURNS = (2.0 * pi, 360.0)
-_NEAR_END = 4.0  # other steps: a jump leads from one end of the range to the other
-_MOST_JUMPS = 10  # least number of samples per jump
-_NEARLY = 0.75  # of a counter's range: a step this long between two samples is an overflow
-_SMALL = 0.25  # of the range: no other step is longer
+_NEAR_END = 4.0  # multiple of the other steps: a jump leads from one end of the range to the other
+_MOST_JUMPS = 10  # minimum number of samples per jump
+_NEARLY = 0.75  # share of a counter's range: a step this long between two samples is an overflow
+_SMALL = 0.25  # share of the range: no other step is longer
 _SLOWEST_STEP = 0.5  # s: a longer step between samples is in milliseconds, or in microseconds
-_HALF_TURN = pi  # half the span of an angle: a greater one is in degrees
+_HALF_TURN = pi  # half the span of an angle in radians: a greater span is in degrees
 _LONGEST_FORMULA = 200  # characters
 _NUMBER = r"([+-]?\s*(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
 _VARIABLE = r"(?:[VvXxUu]|volts?)"
@@ -36,7 +36,7 @@ _LINE = re.compile(
     rf"(?i)\s*(?:{_NUMBER}\s*(?=[+-]))?\s*(?:{_NUMBER}\s*\*?|([+-])?)\s*{_VARIABLE}\s*"
     rf"(?:/\s*{_NUMBER})?\s*(?:{_NUMBER})?\s*"
 )
-"""``a + b*V``, ``b*V + a`` or ``V/d``: offset, factor or its sign, divisor and offset behind."""
+"""``a + b*V``, ``b*V + a`` or ``V/d``: offset, factor or its sign, divisor and trailing offset."""
 _BRACKET = re.compile(
     rf"(?i)\s*(?:{_NUMBER}\s*(?=[+-]))?\s*(?:{_NUMBER}\s*\*?|([+-])?)\s*\(([^()]*)\)\s*"
     rf"(?:([*/])\s*{_NUMBER})?\s*(?:{_NUMBER})?\s*"
@@ -92,7 +92,7 @@ def stated_unit(text: str | None, kinds: Sequence[str], option: str) -> str | No
 
 
 def describes_samples(name: str) -> bool:
-    """Whether a number of a file is the rate or the step of its samples, by its name."""
+    """Whether a number in a file is the rate or the step of its samples, by its name."""
     return any(pattern.search(name) for pattern in (_OWN_STEP, _RATE_FACTS, _STEP_FACTS))
 
 
@@ -100,7 +100,7 @@ def sample_interval(facts: Mapping[str, float], choices: ImportChoices) -> tuple
     """The interval of samples without times, s, None if it is not stated; and its source."""
     if choices.rate is not None:
         return 1.0 / choices.rate, f"{choices.rate:g} Hz as stated"
-    # First the step of the very columns, then numbers that describe the whole file.
+    # first the step of these columns, then numbers that describe the whole file
     for pattern, is_rate in ((_OWN_STEP, False), (_RATE_FACTS, True), (_STEP_FACTS, False)):
         least, most = (limits.SLOWEST_RATE, limits.FASTEST_RATE) if is_rate else _STEPS
         for name, value in facts.items():
@@ -125,7 +125,7 @@ def guessed_angle_unit(values: Rows) -> tuple[str, float]:
 def in_seconds(
     times: Channel, count: int, facts: Mapping[str, float], choices: ImportChoices, where: str
 ) -> RunColumn:
-    """The times of a run, s: from their column, or of a count of rows at the stated rate; guesses are reported."""
+    """The times of a run, s: from their column, or by counting rows at the stated rate; guesses are reported."""
     if times is NO_CHANNEL:
         interval, origin = sample_interval(facts, choices)
         if interval is None:
@@ -157,10 +157,10 @@ def _ask_for_unit(channel: Channel, kinds: Sequence[str], option: str, where: st
 
 
 def refuse_without_unit(channels: Sequence[Channel], where: str) -> None:
-    """Refuse columns named as rates or accelerations whose unit is not stated.
+    """Refuse columns named as rates or accelerations without a stated unit.
 
-    Their size does not separate rad/s from deg/s, as an angle's separates rad from deg: a rate has no greatest
-    value.
+    The size of an angle shows whether it is in rad or deg. The size of a rate does not, since a rate has no
+    greatest value.
     """
     kinds = {channel: named_kind(channel.name) for channel in channels if not channel.unit}
     first = next(filter(None, kinds.values()), "")
@@ -246,7 +246,7 @@ def in_radians(
     quantity: Quantity = "rate" if kind == "rate" else "acceleration" if kind == "acceleration" else "angle"
     values = values if factor == 1.0 else values * factor
     swing = 0.5 * float(np.nanmax(values) - np.nanmin(values))
-    # A disc between springs swings as far, but counts look like degrees.
+    # a disc between springs swings as far, but counts look like degrees
     if unit == "deg" and choices.unit is None and calibration is None and swing > _HALF_TURN:
         what = f"{reading.quoted} would swing by more than half a turn in degrees"
         raise asking("--counts-per-turn N", what, where, " for an encoder, or --unit deg if it does")
@@ -279,7 +279,7 @@ def _straight_line(text: str) -> tuple[float, float] | None:
 
 
 def read_calibration(text: str | None) -> Calibration | None:
-    """The calibration: a formula such as ``0.1 + 20*V``, or from a text file of volts and angle."""
+    """The calibration from a formula such as ``0.1 + 20*V``, or from a text file of volts and angle."""
     if text is None:
         return None
     line = _straight_line(text)

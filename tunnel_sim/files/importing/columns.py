@@ -44,27 +44,26 @@ from tunnel_sim.vocabulary.errors import TunnelError, asking, attempt, did_you_m
 from tunnel_sim.vocabulary.freedom import DISPLACEMENT, FREEDOMS, column_unit, freedom_of_column, linear_unit
 from tunnel_sim.vocabulary.input_kinds import without_command
 
-_HEAD = 20_000  # samples of a column without a name that are inspected
-_STEADY = 0.5  # of the usual step: the steps of a clock differ by less
-_JUDGED = 200_000  # samples of a column that is not used, for its effect on the angle
-_MOST_JUDGED = 8  # columns
-_LEAST_JUDGED = 16  # samples
-_UNNAMED = 4  # of the levels of `_likeliest`: neither name nor unit is an angle's
-_LINEAR = range(
-    7, 11
-)  # of these levels: the unit is a displacement's, its rate's or its acceleration's, a base's
-_HARDLY = 0.02  # of the span of another column in the same unit
-_DERIVATIVE = 0.9  # correlation with the derivative of another column, from which a column is its rate
+_HEAD = 20_000  # number of inspected samples of a column without a name
+_STEADY = 0.5  # share of the usual step: the steps of a clock differ by less
+_JUDGED = 200_000  # number of samples of an unused column, for testing its effect on the angle
+_MOST_JUDGED = 8  # maximum number of columns
+_LEAST_JUDGED = 16  # minimum number of samples
+_UNNAMED = 4  # level of `_likeliest`: neither name nor unit is an angle's
+# levels of `_likeliest` with the unit of a displacement, of its rate or acceleration, or of a base's acceleration
+_LINEAR = range(7, 11)
+_HARDLY = 0.02  # share of the span of another column in the same unit
+_DERIVATIVE = 0.9  # correlation with the derivative of another column from which a column is its rate
 
 
 @dataclass(frozen=True, eq=False)
 class RunColumns:
-    """The columns of one run: as in the file, and then as numbers, NaN where there is none.
+    """The columns of one run: as in the file, and then as numbers; NaN for a missing number.
 
     Args:
-        run: its name in the table.
-        input: None for a free decay.
-        remarks: first on the choice of the columns, then on their numbers.
+        run: name of the run in the table.
+        input: input of a driven run; None for a free decay.
+        remarks: remarks on the choice of the columns, then on their numbers.
     """
 
     run: str
@@ -81,7 +80,7 @@ class RunColumns:
 
 
 class Unread(TunnelError):
-    """Open questions about the columns of a run: units, a rate, or which of several is meant."""
+    """Open questions about the columns of a run: units, a rate, or which of several columns is meant."""
 
     def __init__(self, fault: TunnelError, columns: RunColumns) -> None:
         reading = columns.reading.channel
@@ -96,12 +95,12 @@ def find_columns(
     """The columns of each run of a table, at least one run; guesses are reported.
 
     Raises:
-        Unread: for all that is to be stated of the columns of a run.
+        Unread: with all questions about the columns of a run.
     """
-    several: list[TunnelError] = []  # all that is to be stated of a file is asked for at once
+    several: list[TunnelError] = []  # all questions about a file are asked at once
     try:
         runs = find_pairs(table, choices, where)
-    except Unread as fault:  # the first of several columns that may be the angle, and what it asks for
+    except Unread as fault:  # the first of several columns that may be the angle, and its questions
         several, runs = [fault], [fault.columns]
     found = [_as_numbers(table, run, choices, calibration, where, several) for run in runs]
     if len(found) == 1:  # beside several runs, other columns belong to other runs
@@ -117,7 +116,7 @@ def _as_numbers(
     where: str,
     asked: Sequence[TunnelError],
 ) -> RunColumns:
-    """The columns of a run in seconds and radians, and its input; ``asked``: questions that are open already."""
+    """The columns of a run in seconds and radians, and its input; ``asked``: questions that are already open."""
     faults = [*asked]
     clock, channel = run.time.channel, run.reading.channel
     rows, facts = channel.values.size, table.facts
@@ -142,7 +141,7 @@ def _as_numbers(
 
 
 def _unused(table: Table, columns: RunColumns, choices: ImportChoices) -> list[str]:
-    """The unused columns, and which of them move before or with the reading."""
+    """The unused columns, and those of them that move before or with the reading."""
     named_before = " ".join(columns.remarks)
     others = [
         channel
@@ -176,12 +175,12 @@ def _unused(table: Table, columns: RunColumns, choices: ImportChoices) -> list[s
 
 
 def with_readings(tables: Sequence[Table], choices: ImportChoices, where: str) -> list[Table]:
-    """The tables of a file without those on the clocks of columns beside the angle.
+    """The tables of a file, without tables on the clocks of columns other than the angle.
 
     Args:
         tables: in their order; a part with several clocks has its tables one after another.
     """
-    kept = []
+    remaining = []
     for _, group in groupby(tables, key=lambda table: (table.part, bool(table.native))):
         part = list(group)
         if part[0].native:
@@ -190,14 +189,14 @@ def with_readings(tables: Sequence[Table], choices: ImportChoices, where: str) -
             if not found:
                 _refuse_without_angle(block, where)
             part = [table for table in part if any(c.name in table.native for c in found)]
-        kept += part
-    return kept
+        remaining += part
+    return remaining
 
 
 def _apart(
     table: Table, reading: RunColumn, driven: RunColumn | None, choices: ImportChoices, where: str
 ) -> list[str]:
-    """The columns that cannot be aligned with the reading; refused where one of them may be the input."""
+    """The columns that cannot be aligned with the reading; refused if one of them may be the input."""
     remarks, freedom = [], FREEDOMS[reading.motion]
     for name, unit, why in table.apart:
         column = Channel(name, np.empty(0), unit)
@@ -212,7 +211,7 @@ def _apart(
 
 
 def _without_input(reading: RunColumn, driven: RunColumn) -> NDArray[np.bool_]:
-    """Which readings are before or after the record of the input."""
+    """Mask of the readings before or after the record of the input."""
     known = np.flatnonzero(np.isfinite(driven.values))
     outside = np.isfinite(reading.values)
     if known.size:
@@ -238,7 +237,7 @@ def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[RunColu
     for block in blocks:
         remarks: list[str] = []
         clocks = [channel for channel in block if is_time(channel)]
-        time = NO_CHANNEL  # where the samples follow at a stated rate
+        time = NO_CHANNEL  # from samples at a stated rate
         if choices.time is not None:
             time = _chosen(block, choices.time, "--time", where)[0]
         elif clocks:
@@ -304,33 +303,33 @@ def _readings(
     driving = stated_input(block, choices)
     others = [c for c in free if not is_input(c) and c is not driving]
     measured = [c for c in others if not names_command(c)]
-    level, found = _likeliest(measured)
+    level, readings = _likeliest(measured)
     if level >= _UNNAMED and level not in _LINEAR and len(measured) < len(others):
         twins = {without_command(c.name) for c in others if c not in measured}
         own = [c for c in measured if c.name.strip().lower() in twins]
-        if found and not own:
+        if readings and not own:
             command = next(one_line(c.name, 40) for c in others if c not in measured)
             what = f"'{command}' is a command by its name, and no column beside it is named as the angle"
             raise TunnelError(what, where=where, remedy=f"give --angle, one of {listed(measured)}")
-        found = own or _likeliest(others)[1]
-    widest = {unit: max(_span(c) for c in found if c.unit == unit) for unit in {c.unit for c in found}}
-    still = [c for c in found if _span(c) < _HARDLY * widest[c.unit]]
+        readings = own or _likeliest(others)[1]
+    widest = {unit: max(_span(c) for c in readings if c.unit == unit) for unit in {c.unit for c in readings}}
+    still = [c for c in readings if _span(c) < _HARDLY * widest[c.unit]]
     remarks = [f"'{stem(channel.name)}' is left out: it hardly moves" for channel in still]
-    found = [channel for channel in found if channel not in still]
-    while len(found) > 1 and (rate := _a_rate(found, time)) is not None:
+    readings = [channel for channel in readings if channel not in still]
+    while len(readings) > 1 and (rate := _a_rate(readings, time)) is not None:
         remarks.append(f"'{stem(rate.name)}' is left out: it is the rate of another column")
-        found.remove(rate)
-    of_runs = len({stem(c.name) for c in found}) == 1 and all(RUN_MARK.search(c.name) for c in found)
-    if len(found) > 1 and not of_runs:
-        what = f"{len(found)} columns may be the angle: {listed(found)}"
-        several = asking(f'--angle "{found[0].name}"', what, where, ", or another of them")
-        raise Unread(several, _pair(time, found[0]))
-    remarks += [f"angle from '{stem(channel.name)}'" for channel in found if len(others) > 1]
-    return found, remarks
+        readings.remove(rate)
+    of_runs = len({stem(c.name) for c in readings}) == 1 and all(RUN_MARK.search(c.name) for c in readings)
+    if len(readings) > 1 and not of_runs:
+        what = f"{len(readings)} columns may be the angle: {listed(readings)}"
+        several = asking(f'--angle "{readings[0].name}"', what, where, ", or another of them")
+        raise Unread(several, _pair(time, readings[0]))
+    remarks += [f"angle from '{stem(channel.name)}'" for channel in readings if len(others) > 1]
+    return readings, remarks
 
 
 def _likeliest(channels: Sequence[Channel]) -> tuple[int, list[Channel]]:
-    """The columns that are most likely readings, and how they show it: from 0, most certain, to 11, not at all."""
+    """The most likely columns of readings, and the level of evidence: from 0, most certain, to 11, not at all."""
     levels: list[list[Channel]] = [[] for _ in range(11)]
     for c in channels:
         kind, by_name = kind_of(c.unit), ANGLE.search(c.name) and not named_kind(c.name)
@@ -340,7 +339,7 @@ def _likeliest(channels: Sequence[Channel]) -> tuple[int, list[Channel]]:
             levels[0].append(c)
         elif c.unit == "" and by_name:
             levels[1].append(c)
-        elif c.unit and kind == "" and by_name:  # in an unknown unit, which the user is asked for
+        elif c.unit and kind == "" and by_name:  # in an unknown unit; the user is asked
             levels[2].append(c)
         elif kind == "counts":
             levels[3].append(c)
@@ -380,7 +379,7 @@ def _span(channel: Channel) -> float:
 
 
 def _a_rate(channels: Sequence[Channel], time: Channel) -> Channel | None:
-    """A column that follows the derivative of another one; None if there is none."""
+    """A column that follows the derivative of another column; None if there is none."""
     if time is NO_CHANNEL:
         return None
     for angle in channels:

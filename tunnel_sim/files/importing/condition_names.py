@@ -35,7 +35,7 @@ class Conditions(StrictModel):
 RIG_KEYS = ("yaw_inertia", "frontal_area", "reference_length", "width")
 RUN_KEYS = ("wind_speed", "spring_stiffness", "air_density", "release_angle")
 OF_REPEATABILITY = "repeatability_"
-"""Begins the keys of ``[repeatability]`` where they stand beside conditions of the same names."""
+"""Prefix of the keys of ``[repeatability]`` beside conditions of the same names."""
 
 SPREAD_KEYS = tuple(key for key in Conditions.model_fields if key.startswith(OF_REPEATABILITY))
 OF_CAMPAIGN = (*RIG_KEYS, *SPREAD_KEYS)
@@ -62,13 +62,13 @@ _LIKE = {
         r"(.*[ _])?(spring|feder|stiffness|steifigkeit)[ _]?(k|const\w*|rate)?"
     ),
 }
-"""Names without a unit that may mean a condition, or something else."""
+"""Names without a unit that may mean a condition, or another quantity."""
 _WINDY = re.compile(
     r"(?i)(?<![a-z])(wind|air|flow|free_?stream|tunnel|pitot|anemometer|prandtl|fan|blower|gebl[äa]se|str[öo]mung|"
     r"luft|windkanal)(?![a-z])|(?<![a-z])(air|wind|flow|fan)_?(speed|spd|vel)|(?<![a-z])[uv]_?(inf|∞|mean|air|wind|"
     r"tunnel|ref|fs)(?![a-z])|(?<![a-z])(speed|velocity|geschwindigkeit)(?![a-z])"
 )
-"""Words of a name that suggest a speed of the wind."""
+"""Words in a name that suggest a wind speed."""
 _NOT_WINDY = re.compile(
     r"(?i)(?<![a-z])t_(?=air|luft|flow|tunnel|wind)|ang|winkel|dreh|omega|motor|shaft|servo|joint|wheel|yaw|gyro|temp|press(ure)?$|druck$|humid|feucht|density|"
     r"dichte|date|time|name|number|nummer|version|serial|fps|sample|cpu|baud|sound|light|step|index|count|code"
@@ -93,14 +93,14 @@ _SIZES = {
     "reference_length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
     "width": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
 }
-"""Factors to SI of the units of sizes: they name no column, and are not among `UNITS`."""
+"""Factors to SI of the units of sizes: no column has them, and they are not among `UNITS`."""
 
 
 SPEED_IN_TEXT = re.compile(
     r"(?i)(?<![\w.])(\d+(?:[.,]\d+)?)\s*(m/s|m/sec|ms-1|km/h|kmh|kph|mph|ft/s|fps|knots?|kts?)(?![\w/])"
 )
 WIND_ON = re.compile(r"wind[\s_-]*on(?![a-z])", re.IGNORECASE)
-"""A speed in a text, and the words that a wind is on."""
+"""A speed in a text, and the words for wind on."""
 
 
 def mentions_wind(text: str) -> bool:
@@ -117,7 +117,7 @@ def condition_of(name: str, unit: str, *, alone: bool = False) -> str | None:
     found = next((key for key, pattern in _KEYS.items() if pattern.fullmatch(plain)), None)
     if found is None and kind_of(unit) == "stiffness" and _LIKE["spring_stiffness"].fullmatch(plain):
         return "spring_stiffness"
-    # A unit of time does not fit such a name.
+    # a unit of time does not fit such a name
     symbol = kind_of(unit) == "speed" or unit == "ms" or (alone and unit == "" and plain.lower() == "speed")
     return "wind_speed" if found is None and symbol and _SYMBOL.fullmatch(name) else found
 
@@ -137,7 +137,7 @@ def resembles(name: str, unit: str) -> str | None:
 
 
 def in_si(key: str, unit: str) -> float | None:
-    """The factor to SI of a condition or size in a unit; None where the unit does not measure it."""
+    """The factor to SI of a condition or size in a unit; None if the unit does not measure it."""
     if unit == "":
         return 1.0
     if key in _KINDS:
@@ -153,17 +153,18 @@ def units_of(key: str) -> str:
 
 @dataclass(frozen=True)
 class Hint:
-    """Content that resembles a condition and is not used as one.
+    """Content that resembles a condition but is not used as one.
 
     Args:
-        key: of `Conditions`.
-        value: in SI units if it is that condition; NaN if its unit is not known.
-        what: its description in the file or its name, for a message.
+        key: key of `Conditions`.
+        value: value in SI units if it is this condition; NaN if its unit is not known.
+        what: description or name in the file, for a message.
         why: the reason for not using it.
         use: the option that uses or states it.
-        option: that option with its value; empty where the value or a file is for the user to add.
+        option: this option with its value; empty if the user must add the value or a file.
         brief: the hint without its number, the same for every run; empty: the words without it.
-        symbol: whether only a column's letter suggests it, which in a robot's log is a command or a velocity.
+        symbol: whether only a column's letter suggests it; in a robot's log this letter is a command or a
+            velocity.
     """
 
     key: str

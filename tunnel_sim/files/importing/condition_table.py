@@ -24,7 +24,7 @@ from tunnel_sim.vocabulary.freedom import DISPLACEMENT
 
 
 def _same(name: str) -> str:
-    """A name for comparison: some systems decompose the accents of file names."""
+    """A name in the form used for comparison: some systems decompose the accents of file names."""
     return unicodedata.normalize("NFC", name).lower()
 
 
@@ -84,7 +84,7 @@ class ConditionTable:
             self._rows[_same(name)] = values
 
     def of(self, path: Path, run: str) -> dict[str, float]:
-        """Conditions of a run, by its name or the name of its file."""
+        """Conditions of a run, looked up by its name or the name of its file."""
         for name in (run, path.name, path.stem, stem_of(path)):
             if _same(name) in self._rows:
                 return self._rows[_same(name)]

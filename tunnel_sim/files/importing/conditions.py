@@ -33,14 +33,14 @@ from tunnel_sim.vocabulary.campaign import needs_density
 from tunnel_sim.vocabulary.errors import TunnelError, asking, counted, did_you_mean, one_line
 from tunnel_sim.vocabulary.freedom import ANGLE, Freedom
 
-_OFF = 0.5  # of the range: the median of a wind speed that starts late is further from zero
-_EVEN = 1e-9  # of a value: a column that varies less is constant
+_OFF = 0.5  # share of the range: the median of a wind speed that starts late is further from zero
+_EVEN = 1e-9  # share of a value: a column that varies less is constant
 _IN_TABLE = ("wind_speed", "spring_stiffness")  # columns of the table of runs
-_LISTED = 10  # statements of a file that are listed in a remark
+_LISTED = 10  # number of statements of a file that a remark lists
 
 
 class Unstated(TunnelError):
-    """A condition of a run that only the user can state, even beside other sources."""
+    """A condition of a run that only the user can state, even if there are other sources."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class Stated:
         numbers: conditions and sizes by key of `Conditions`, in its units.
         columns: columns of conditions by key.
         named: conditions in the name of the file, by key.
-        hints: unused numbers of the file.
+        hints: hints of unused numbers of the file.
         like: unused columns that resemble conditions, with their hints.
     """
 
@@ -78,7 +78,7 @@ class Stated:
         return {key: value for key, (value, _) in stated.items()}, remarks
 
     def unused(self, rows: NDArray[np.intp]) -> list[Hint]:
-        """Unused content that resembles a condition in some rows; a column about zero does not."""
+        """Unused content that resembles a condition in some rows, except columns about zero."""
         found = [*self.hints]
         for column, hint in self.like:
             values = _from_column(hint.key, column, rows, 1.0)
@@ -89,11 +89,11 @@ class Stated:
 def find_conditions(
     table: Table, beside: Sequence[Channel], choices: ImportChoices, where: str, freedom: Freedom = ANGLE
 ) -> tuple[Stated, list[str]]:
-    """The statements of a table on the conditions of its runs, and remarks on them.
+    """The statements of a table about the conditions of its runs, and remarks on them.
 
     Args:
-        beside: the columns used otherwise.
-        freedom: of the readings, under whose names and units conditions are stated.
+        beside: the columns with other uses.
+        freedom: freedom of the readings; conditions are stated under its names and in its units.
     """
     claimed = choices.stated_by.model_dump(exclude_none=True)
     numbers, hints, remarks = _from_facts(table.facts, claimed, where, freedom)
@@ -110,7 +110,7 @@ def find_conditions(
         if (key or resembles(name, unit)) in freedom.refused:
             continue
         if key is not None and in_si(key, unit) is not None:
-            columns.setdefault(key, channel)  # the first of several that state the same
+            columns.setdefault(key, channel)  # the first of several with the same statement
         elif hint := _hint(name, unit, key, float("nan")):
             like.append((channel, hint))
     known = {**table.facts, **{channel.name: 0.0 for channel in table.channels}}
@@ -124,7 +124,7 @@ def find_conditions(
 
 
 def _unused_statements(table: Table, claimed: Mapping[str, str], freedom: Freedom) -> list[str]:
-    """A remark on the numbers and texts of a table that are neither used nor reported otherwise."""
+    """A remark on the numbers and texts of a table that are neither used nor reported elsewhere."""
     found = []
     for heading, value in table.facts.items():
         name, unit, _ = freedom.condition(*split_unit(heading))
@@ -139,7 +139,7 @@ def _unused_statements(table: Table, claimed: Mapping[str, str], freedom: Freedo
 
 
 def _hint_of_text(name: str, text: str) -> Hint | None:
-    """The hint of a text beside the columns that mentions a speed, or that the wind is on."""
+    """The hint of a text that mentions a speed, or that the wind is on."""
     shown_text = f"'{one_line(name, 40)}: {one_line(text, 60)}'"
     speed = SPEED_IN_TEXT.search(text)
     if speed is not None:
@@ -160,7 +160,7 @@ def _from_facts(
     """Conditions and sizes stated by numbers of a file, by key, in the units of `Conditions`; hints; remarks.
 
     Args:
-        claimed: by key, the names of numbers that the user has declared to state a condition.
+        claimed: by key, the names of numbers that, according to the user, state a condition.
     """
     conditions: dict[str, float] = {}
     names: dict[str, str] = {}
@@ -182,7 +182,7 @@ def _from_facts(
         elif hint := _hint(name, unit, key, float(value)):
             hints.append(hint)
     symbols = [hint for hint in hints if hint.key == "wind_speed" and np.isfinite(hint.value)]
-    # A density is stated for the wind alone: the only symbol of a speed beside it means the wind.
+    # a density is stated for the wind only, so a single symbol of a speed beside it means the wind
     if "air_density" in conditions and "wind_speed" not in conditions and len(symbols) == 1:
         conditions["wind_speed"], names["wind_speed"] = symbols[0].value, f"{symbols[0].what}, in m/s"
         hints.remove(symbols[0])
@@ -192,7 +192,7 @@ def _from_facts(
 
 
 def stated_remark(key: str, value: float, place: str) -> ImportRemark:
-    """The remark that a place states a condition; the table of runs has the numbers of some."""
+    """The remark that a place states a condition; the table of runs shows the numbers of some conditions."""
     text = f"{key} = {value:g} from {place}"
     return ImportRemark(text, f"{key} from {place}" if key in _IN_TABLE else text)
 
@@ -250,7 +250,7 @@ def _from_column(
 
 
 def of_short_table(table: Table) -> list[Hint]:
-    """Apparent statements on the runs in a table too short for a record."""
+    """Apparent statements about the runs in a table too short for a record."""
     found = []
     for channel in table.channels:
         key = condition_of(channel.name, channel.unit) or resembles(channel.name, channel.unit)
@@ -276,11 +276,11 @@ def conditions_of(
     """The conditions of the run in some rows, and the sizes stated beside them, by key; and remarks."""
     given = choices.conditions.model_dump(include=set(RUN_KEYS), exclude_none=True)
     in_table = {} if table is None else table.of(file, run)
-    # Precedence: --set, the table, the name of the file, the columns, and other numbers of the file.
+    # precedence: --set, the table, the name of the file, the columns, and other numbers of the file
     measured, remarks = stated.measured(rows)
     found = {**stated.numbers, **measured, **stated.named, **in_table, **given}
     sizes = {key: found.pop(key) for key in OF_CAMPAIGN if key in found}
-    sizes = {} if list(sizes) == ["width"] else sizes  # many things have a width
+    sizes = {} if list(sizes) == ["width"] else sizes  # "width" may denote the width of many things
     validate(Conditions, found | sizes, file)
     plausible_values(found | sizes, where)
     return found, sizes, remarks
@@ -299,8 +299,8 @@ def ask_conditions(
     """Refuse a table without a condition that only the user can state, before its records are known.
 
     Args:
-        named: conditions stated by the name of the file, or for it.
-        hints: conditions that the name of the file seems to state; the others are as above.
+        named: conditions stated by the name of the file, or for the file.
+        hints: conditions that the name of the file seems to state; the other arguments are as above.
     """
     stated, _ = find_conditions(table, beside, choices, where)
     rows = np.arange(table.channels[0].values.size)
@@ -325,16 +325,17 @@ def open_conditions(
 ) -> tuple[list[ImportRemark], bool]:
     """Remarks on unused content that resembles a condition, and whether an air density is missing.
 
-    Wind-off is not assumed where a wind is suggested; the other statements that a wind needs are asked for at once.
+    Wind-off is not assumed if a wind is suggested; the other statements that a wind needs are asked for at
+    once.
 
     Args:
-        known: conditions of the run.
-        sizes: of the rig; None: not stated.
-        name: of file and run, which may mention a wind.
+        known: known conditions of the run.
+        sizes: sizes of the rig; None: not stated.
+        name: name of file and run, which may mention a wind.
         later: whether a missing air density may be stated later.
 
     Raises:
-        Unstated: for all that only the user can state.
+        Unstated: with all conditions that only the user can state.
     """
     open_ones = [hint for hint in hints if hint.key not in known]
     remarks = [doubt(hint.words, hint.short) for hint in open_ones]

@@ -43,7 +43,7 @@ def name_pattern(text: str) -> re.Pattern[str]:
 
 
 def from_name(pattern: re.Pattern[str] | None, path: Path) -> dict[str, float]:
-    """Conditions in the name of a file, which must match the pattern where there is one."""
+    """Conditions in the name of a file, which must match the pattern if there is one."""
     if pattern is None:
         return {}
     found = pattern.match(path.stem if path.suffix.lower() == PACKED else path.name)
@@ -60,7 +60,7 @@ _LABELS = {
     "air_density": r"density|rho",
 }
 _LABEL = "|".join(_LABELS.values())
-_AFTER = {  # units behind a number in a file's name, and the factor to SI; "ms" is as often a time
+_AFTER = {  # units after a number in a file's name, and the factor to SI; "ms" is as often a time
     "wind_speed": {"m_s": 1.0, "m-s": 1.0, "mps": 1.0, "kmh": 1 / 3.6, "km_h": 1 / 3.6, "kph": 1 / 3.6}
     | {"mph": 0.44704, "kn": 0.514444, "kts": 0.514444, "fps": 0.3048},
     "release_angle": {"deg": np.pi / 180.0, "grad": np.pi / 180.0, "°": np.pi / 180.0},
@@ -83,10 +83,10 @@ class NamePart:
     """A part of a file's name that may state a condition.
 
     Args:
-        value: in SI units.
+        value: value in SI units.
         before: text before the number, as in the name.
         behind: text after it.
-        written: whether the number is that value, so that a pattern of names can read it.
+        written: whether the number equals the value, so that a pattern of names can read it.
     """
 
     key: str
@@ -99,7 +99,7 @@ class NamePart:
 
     @property
     def text(self) -> str:
-        """The part with a place for its number."""
+        """The part, with a placeholder for its number."""
         return f"{self.before}{{{_PLACES.get(self.key, self.key)}}}{self.behind}"
 
 
@@ -133,8 +133,8 @@ def _parts(stem: str, *, speeds: bool) -> Iterator[NamePart]:
 
 
 def name_hints(files: Sequence[Path]) -> dict[Path, list[Hint]]:
-    """Apparent statements in the names of files, with a pattern for them where all names have the same parts."""
-    # The number before "ms" differs between runs of several speeds; the sampling of a logger is the same.
+    """Apparent statements in the names of files, with a pattern for them if all names have the same parts."""
+    # the number before "ms" differs between runs of several speeds; a logger's sampling does not
     numbers = [[match["number"] for match in _SPEED_OR_TIME.finditer(stem_of(path))] for path in files]
     speeds = all(map(len, numbers)) and len({tuple(one) for one in numbers}) > 1
     pattern = _pattern(files, speeds=speeds)

@@ -8,16 +8,16 @@ from numpy.typing import NDArray
 from tunnel_sim.vocabulary.quantities import PerSample, Times
 from tunnel_sim.vocabulary.record import Array
 
-_HALVES = 7  # half cycles to which the model is fitted
-_LEAST = 5  # extremes
+_HALVES = 7  # number of half cycles to which the model is fitted
+_LEAST = 5  # minimum number of extremes
 _SAMPLES = 300
 _STEPS = 12
 _MOST = 300.0  # exponent: a model that grows further is not extended
 _SETTLED = 1e-9
-_NOISES = 6.0  # standard deviations that a sample of a free motion does not exceed
-_ERRORS = 3.0  # times the error half a cycle later: a nonlinearity grows with the swing
-_CLEARLY = 2.0  # times that: below it nothing is left out
-_OF_SWING = 0.01  # of the amplitude: slight nonlinearities change a half cycle by less
+_NOISES = 6.0  # maximum deviation of a sample of a free motion, in standard deviations
+_ERRORS = 3.0  # multiple of the error half a cycle later: a nonlinearity grows with the swing
+_CLEARLY = 2.0  # multiple of that error: below it nothing is left out
+_OF_SWING = 0.01  # share of the amplitude: slight nonlinearities change a half cycle by less
 
 
 def free_from(time_s: Times, reading: PerSample, first: int, turns: NDArray[np.intp], noise: float) -> int:
@@ -26,7 +26,8 @@ def free_from(time_s: Times, reading: PerSample, first: int, turns: NDArray[np.i
     A free decay is fitted to the half cycles after the first extreme that is certainly free, and extended back.
 
     Args:
-        turns: indices of the extremes after ``first``, the certain one first; at least four.
+        turns: indices of the extremes after ``first``, starting with the first extreme that is certainly free;
+            at least four.
         noise: standard deviation of the reading's noise.
     """
     turns = turns[: _HALVES + 1]
@@ -36,7 +37,7 @@ def free_from(time_s: Times, reading: PerSample, first: int, turns: NDArray[np.i
 
 
 def free_until(time_s: Times, reading: PerSample, last: int, turns: NDArray[np.intp], noise: float) -> int:
-    """The index after the last sample of a free motion that something ends; ``last`` itself, or earlier.
+    """The index after the last sample of a free motion that is then disturbed; ``last`` itself, or earlier.
 
     Args:
         turns: indices of the extremes before ``last``, the latest one last; at least four.
@@ -63,7 +64,7 @@ def _from(time: Times, reading: PerSample, first: int, turns: NDArray[np.intp], 
 
 
 def _away(time: Times, reading: PerSample, first: int, turns: NDArray[np.intp]) -> PerSample | None:
-    """Readings before some turning points less the free decay that is fitted between these."""
+    """Readings before some turning points less the free decay fitted between these points."""
     a, b = int(turns[0]), int(turns[-1]) + 1
     stride = max(1, (b - a) // _SAMPLES)
     halves_per_s = (turns.size - 1) / float(time[b - 1] - time[a])

@@ -1,4 +1,4 @@
-"""Statements to an import beside the content of a file: choices, a calibration, a table of conditions, names."""
+"""Statements to an import outside the content of a file: choices, a calibration, a table of conditions, names."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from tunnel_sim.vocabulary.freedom import Freedom
 
 @dataclass(frozen=True, eq=False)
 class ImportStatements:
-    """Statements beside the content of the files.
+    """Statements outside the content of the files.
 
     Args:
-        table: of conditions; None: there is none.
-        hints: by file, conditions that its name seems to state.
+        table: table of conditions; None: there is none.
+        hints: by file, conditions that the name of the file seems to state.
         several: whether the names of runs must name their file among others.
         later: whether missing air densities may be stated later.
     """
@@ -72,7 +72,7 @@ class ImportStatements:
         return replace(self, choices=self.choices.model_copy(update={"conditions": Conditions(**own)}))
 
     def named(self, file: Path) -> dict[str, float]:
-        """Conditions in the name of a file, which must match the pattern where there is one."""
+        """Conditions in the name of a file, which must match the pattern if there is one."""
         return from_name(self.pattern, file)
 
     def of_file(self, file: Path) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""Step 4 of an import: a run, cut from its record, with its conditions, stated or still open."""
+"""Step 4 of an import: a run, cut from its record, with its stated and open conditions."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from tunnel_sim.vocabulary.inputs import HOLDS, Hold, Input, without_spring_need
 from tunnel_sim.vocabulary.quantities import Readings, Times
 from tunnel_sim.vocabulary.record import Record
 
-_JUDGED = 500_000  # samples for counting the cycles of a long record
+_JUDGED = 500_000  # number of samples for counting the cycles of a long record
 
 
 @dataclass(frozen=True, eq=False)
 class ImportedRun:
-    """A run, or a stretch mistaken for one.
+    """A run, or a stretch mistaken for a run.
 
     Args:
         rest: the stated reading at rest, which is subtracted, rad (rad/s or rad/s²); None: not stated.
-        sizes: of the rig, and scatter between runs, as the file states them.
-        held: conditions that a campaign uses only with an air density, which is not yet stated.
+        sizes: sizes of the rig, and scatter between runs, as stated by the file.
+        held: conditions that a campaign uses only with an air density that is not yet stated.
         without_density: whether the air density is not yet stated.
     """
 
@@ -63,10 +63,10 @@ def imported_run(
     """A run of a record.
 
     Args:
-        piece: the part of the record that is the run.
+        piece: the part of the record with the run.
 
     Raises:
-        Unstated: where a condition is open that only the user can state.
+        Unstated: when a condition is open that only the user can state.
     """
     choices = beside.choices
     where = shown(raw.source) + ("" if name == one_line(stem_of(raw.source)) else f", run '{name}'")
@@ -104,7 +104,7 @@ def imported_run(
         record, stride = None, time.size // _JUDGED
         release = None if drive is not None else stated.get("release_angle")
         if drive is None and stride > 1:
-            # A long record that passes when thinned also passes as a whole, which would take seconds to check.
+            # a long record that passes when thinned also passes as a whole, which would take seconds to check
             with suppress(TunnelError):
                 checked_record(time[::stride], reading[::stride], "the reading", sensor, release, where)
                 record = Record(time, reading)
@@ -157,7 +157,7 @@ def _on_the_cut(
 
 
 def _left_out(error: TunnelError) -> str:
-    """Why a run is left out, and how to keep it where the campaign's file can state that."""
+    """Why a run is left out, and how to keep it if a statement in the campaign's file permits it."""
     kept = f"; {KEEP} in a campaign.toml" if KEEP in error.remedy else ""
     return f"left out: {error.what}{kept}"
 

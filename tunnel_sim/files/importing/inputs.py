@@ -1,4 +1,4 @@
-"""The input of a driven run: its column, found by name and unit, and by a test that it drives the motion."""
+"""The input of a driven run: its column, found by name and unit, and by a test whether it drives the motion."""
 
 from __future__ import annotations
 
@@ -25,13 +25,14 @@ _NAMES = re.compile(
     r"tau|effort|u|base|root)(?![a-z])",
     re.IGNORECASE,
 )
-_FALSE_ALARM = 1e-5  # chance that a column without effect on the motion is taken for its input
+_FALSE_ALARM = 1e-5  # probability that a column without effect on the motion is mistaken for its input
 _ALIKE = 0.9  # correlation from which a column is the angle or its rate by another sensor
-_PAST = 12  # earlier readings that predict a free motion, in which the noise is as good as white
+_PAST = 12  # number of earlier readings that predict a free motion so well that the noise is nearly white
 _INPUTS = 4  # readings of an input, the present and earlier ones: inertia, damping, stiffness and a lag
-_PER_CYCLE = 30  # means that the test takes of a cycle: of more, each hardly differs from its neighbours
-_SINGULAR = 1e-9  # of the largest singular value: a smaller one is rounding
-_LEAST_MEANS = 2000  # of a record that has as many samples, whatever its cycle seems to be
+# maximum number of means in a cycle for the test: with more, each hardly differs from its neighbours
+_PER_CYCLE = 30
+_SINGULAR = 1e-9  # share of the largest singular value: a smaller one is rounding
+_LEAST_MEANS = 2000  # number of means of a record with as many samples, whatever its apparent cycle
 
 
 def stated_input(channels: Sequence[Channel], choices: ImportChoices) -> Channel | None:
@@ -41,12 +42,12 @@ def stated_input(channels: Sequence[Channel], choices: ImportChoices) -> Channel
 
 
 def names_command(channel: Channel) -> bool:
-    """Whether a column is the command of a servo by its name and unit."""
+    """Whether a column is the command of a servo, by its name and unit."""
     return any(_claimed(channel, freedom) == Command.column for freedom in FREEDOMS.values())
 
 
 def names_input(channel: Channel, freedom: Freedom) -> bool:
-    """Whether a column may be an input of a motion by its name and unit, and is not a condition."""
+    """Whether a column may be an input of a motion, by its name and unit, and is not a condition."""
     claimed = is_input(channel) or _claimed(channel, freedom) is not None
     plausible = claimed or _NAMES.search(channel.name) is not None
     return plausible and condition_of(channel.name, channel.unit) is None
@@ -55,10 +56,10 @@ def names_input(channel: Channel, freedom: Freedom) -> bool:
 def find_input(
     channels: Sequence[Channel], clock: Channel, reading: RunColumn, choices: ImportChoices, where: str
 ) -> RunColumn | None:
-    """The input of a run, in the unit of its kind, which is its role; None for a free decay.
+    """The input of a run, in the unit of its kind; the kind is its role. None for a free decay.
 
     Args:
-        clock: the column of the times.
+        clock: the column of times.
     """
     if choices.input == "none":
         return None
@@ -87,7 +88,7 @@ def find_input(
         record = Record(np.arange(np.count_nonzero(good), dtype=np.float64), values[good])
         with suppress(TunnelError):  # it is not the motion itself
             checked_input(Input("drive", channel.values[good]), record, "", judged=False)
-            # The command of an angle by its name moves the body, however little of the motion it explains.
+            # by its name, the command of an angle moves the body, however little of the motion it explains
             certain = names_command(channel) and ANGLE.search(channel.name)
             if certain or chance_without_effect(channel.values[good], values[good]) < _FALSE_ALARM:
                 candidates.append(channel)
@@ -147,7 +148,7 @@ def _claimed(channel: Channel, freedom: Freedom) -> InputColumn | None:
 
 
 def moves_before(values: PerSample, reading: PerSample) -> bool:
-    """Whether a column predicts the reading as an input does; neither a rate of it nor proportional to it."""
+    """Whether a column predicts the reading like an input, without being its rate or proportional to it."""
     slope = np.gradient(reading)
     for own in (reading, slope):
         x, y = values - values.mean(), own - own.mean()
@@ -158,11 +159,11 @@ def moves_before(values: PerSample, reading: PerSample) -> bool:
 
 
 def chance_without_effect(values: PerSample, reading: PerSample) -> Share:
-    """The chance that an input without effect predicts the motion as well, beside the motion's own past.
+    """The chance that an input without effect predicts the motion as well, in addition to the motion's own past.
 
-    An F test of two fits: each reading by the ones before it, as in a free motion; and by the input, too.
+    An F test of two fits: each reading by the previous readings, as in a free motion; and by the input, too.
     """
-    from scipy.special import fdtrc  # only here: slow to load
+    from scipy.special import fdtrc  # imported here because it is slow to load
 
     cycles = 1 + int(np.argmax(np.abs(np.fft.rfft(reading - reading.mean())[1:])))
     block = max(1, reading.size // max(_PER_CYCLE * cycles, _LEAST_MEANS))

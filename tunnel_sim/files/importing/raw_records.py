@@ -37,7 +37,7 @@ from tunnel_sim.vocabulary.turning_points import HoldsTurningPoints, TurningPoin
 _STD = re.compile(
     r"(?i)(d|delta|δ|Δ|σ|sigma|s|u|e|err|error|std|sd|unc|uncertainty|fehler)[ _.(]?(?=[^\W\d_])"
 )
-"""Begins the name of a column of uncertainties."""
+"""Prefix of the name of a column of uncertainties."""
 _LONGEST_SWING = 60.0  # s: longer half periods are in milliseconds
 
 
@@ -46,12 +46,12 @@ class RawRecord:
     """A record of a file, cleaned but not yet cut.
 
     Args:
-        reading: its column, at the cleaned times.
-        stated: the conditions stated in its table.
-        table_rows: its rows there.
-        clock: of these rows, from the first sample on, s; NaN where there is no time.
+        reading: column of the reading, at the cleaned times.
+        stated: conditions stated in the record's table.
+        table_rows: rows of the record in that table.
+        clock: times of these rows, from the first sample on, s; NaN where there is no time.
         whole: whether the file itself states that it is one run.
-        input: of a driven record, at the cleaned times; None for free decays.
+        input: input of a driven record, at the cleaned times; None for free decays.
         input_facts: the order of its hold (0 or 1) and its gain in N m per unit, by key of the format.
     """
 
@@ -74,14 +74,14 @@ class RawRecord:
 
     @property
     def sensor(self) -> SensorProperties:
-        """What the reading says about the sensor; an angle goes unsaid."""
+        """The statement of the reading about the sensor; none for an angle."""
         motion, quantity = self.reading.motion, self.quantity
         return SensorProperties(
             quantity=None if quantity == "angle" else quantity, motion=None if motion == "angle" else motion
         )
 
     def rows(self, first: Seconds, last: Seconds) -> NDArray[np.intp]:
-        """The rows of its table that belong to a run from its first to its last sample."""
+        """The rows of the table that belong to a run, from its first to its last sample."""
         return self.table_rows[(self.clock >= first) & (self.clock <= last)]
 
 
@@ -92,7 +92,7 @@ def raw_records(source: Source, beside: ImportStatements) -> list[RawRecord]:
     long = [table for table in source.tables if table.channels[0].values.size >= LEAST_ROWS]
     short = [hint for table in source.tables if long and table not in long for hint in of_short_table(table)]
     found = []
-    faults: list[TunnelError] = []  # what is to be stated of a file is asked for at once
+    faults: list[TunnelError] = []  # all questions about a file are asked at once
     for table in with_readings(long or source.tables, choices, shown(path)):
         where = shown(path) + (f", {one_line(table.part)}" if table.part else "")
         try:
@@ -119,12 +119,12 @@ def raw_records(source: Source, beside: ImportStatements) -> list[RawRecord]:
 
 
 def _from_start_to_end(time: Rows, choices: ImportChoices) -> tuple[NDArray[np.bool_], list[str]]:
-    """Which rows of a table are used, and a remark."""
+    """Mask of the used rows of a table, and a remark."""
     if choices.start is None and choices.end is None:
         return np.ones(time.shape, dtype=bool), []
     first = -np.inf if choices.start is None else choices.start
     last = np.inf if choices.end is None else choices.end
-    # Stamps are decimals: a start at one of them includes it.
+    # stamps are decimals: a start at a stamp includes it
     slack = 1e-9 * max(abs(end) for end in (choices.start, choices.end) if end is not None)
     kept: NDArray[np.bool_] = (time >= first - slack) & (time <= last + slack)
     return kept, [f"{int(kept.sum())} of {counted(time.size, 'sample')} from --start to --end"]
@@ -143,7 +143,7 @@ def _records(
     """The cleaned records of the columns of a run: one, or one from each start of the clock.
 
     Args:
-        remarks: on its conditions.
+        remarks: remarks on the conditions of the run.
     """
     records = []
     kept, remarks = _from_start_to_end(columns.time.values, choices)
@@ -205,10 +205,10 @@ def _turning_points(
     choices: ImportChoices,
 ) -> TurningPoints:
     """The turning points in some rows of a table, with the standard deviations in its columns."""
-    unit = columns.reading.unit  # also of uncertainties without a known one
+    unit = columns.reading.unit  # also of uncertainties without a known unit
     time, clock = clean.time_s, columns.time.channel
     if clock is not NO_CHANNEL and not clock.unit and choices.time_unit is None:
-        # The step of a clock is short, and half a period of a swing is not.
+        # the step of a clock is short, and half a period of a swing is not
         size = float(np.median(np.diff(np.sort(clock.values[rows]))))
         own = "s" if size < _LONGEST_SWING else "ms"
         time = time * size * UNITS["time"][own] / float(np.median(np.diff(time)))

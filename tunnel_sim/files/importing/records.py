@@ -44,7 +44,7 @@ _FINDERS: Mapping[Quantity, Callable[[Array, Array], list[RecordPiece]]] = {
     "angle": find_runs,
     "rate": find_runs_of_rate,
 }
-"""How releases are found; in accelerations a hand that holds the body does not show."""
+"""How releases are found; a hand that holds the body does not show in accelerations."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +64,7 @@ class Imported:
 
     @property
     def held(self) -> dict[str, dict[str, float]]:
-        """Conditions by run, and sizes under the empty name, that are used once the air density is stated."""
+        """Conditions by run, and sizes under the empty name, that become used once the air density is stated."""
         if not any(part.without_density for part in self.parts):
             return {}
         rig = {key: value for key, value in self.sizes.items() if key in _WITH_DENSITY}
@@ -127,12 +127,12 @@ def read_records(
 
     Args:
         conditions: a table of conditions; None: none.
-        name: of the campaign; empty: the name of the first file.
+        name: name of the campaign; empty: the name of the first file.
         later: whether missing air densities may be stated later (`Imported.held`).
     """
     kept = [path for path in files if path.name not in choices.leave_out]
     beside = ImportStatements.of(kept, choices, conditions, several=len(files) > 1, later=later)
-    faults: list[TunnelError] = []  # what is to be stated of all files and runs is asked for at once
+    faults: list[TunnelError] = []  # all questions about files and runs are asked at once
     sources: list[Source] = []
     raws: list[RawRecord] = []
     for path in kept:
@@ -171,7 +171,7 @@ def read_records(
 
 
 def _resolved(choices: ImportChoices, sources: Sequence[Source], raws: Sequence[RawRecord]) -> ImportChoices:
-    """The choices with the properties that all records share, for the recipe."""
+    """The choices, with the properties that all records share, for the recipe."""
     known: dict[str, Any] = {**sources[0].known}
     units = {raw.reading.unit for raw in raws}
     columns = tuple(dict.fromkeys(stem(raw.reading.channel.name) for raw in raws))
@@ -202,7 +202,7 @@ def _campaign_remarks(campaign: Campaign, table: ConditionTable | None) -> list[
 def _parts(
     raws: Sequence[RawRecord], beside: ImportStatements, faults: list[TunnelError]
 ) -> list[ImportedRun]:
-    """The runs of all records, cut at releases; the refusals of others are added to the faults."""
+    """The runs of all records, cut at releases; refusals of other records are added to the faults."""
     ids = [raw.id for raw in raws]
     parts = []
     for at, raw in enumerate(raws):
@@ -218,7 +218,7 @@ def _parts(
 
 
 def _pieces(raw: RawRecord, choices: ImportChoices) -> list[RecordPiece]:
-    """The runs of a record; one that the file names is one run, without the hand before its release."""
+    """The runs of a record; a record that the file names is one run, without the hand before its release."""
     time, reading = raw.cleaned.time_s, raw.cleaned.reading
     find = _FINDERS.get(raw.quantity)
     if find is None or not choices.cut or raw.input is not None:
@@ -233,7 +233,7 @@ def _pieces(raw: RawRecord, choices: ImportChoices) -> list[RecordPiece]:
 
 
 def _refusal(faults: Sequence[TunnelError]) -> TunnelError:
-    """All refusals as one, which is `Unstated` where only the user can state what is open."""
+    """All refusals as one, which is `Unstated` if only the user can answer."""
     found = together(faults)
     if all(isinstance(fault, Unstated) for fault in faults):
         return Unstated(found.what, where=found.where, remedy=found.remedy, options=found.options)
@@ -249,7 +249,7 @@ def _names(label: str, pieces: Sequence[RecordPiece]) -> list[str]:
 
 
 _WITH_DENSITY = ("frontal_area", "reference_length")
-"""Sizes that a campaign takes beside wind-on runs only where these state their air density."""
+"""Sizes that a campaign with wind-on runs takes only if these state their air density."""
 
 
 def _sizes(parts: Sequence[ImportedRun], choices: ImportChoices) -> dict[str, float]:
@@ -286,9 +286,9 @@ def _campaign(
         RigProperties(**rig),
         replace(
             sensor,
-            # From the readings in the files: the subtracted value need not be a whole number of steps.
+            # from the readings in the files, because the subtracted value need not be a whole number of steps
             resolution=resolution([part.reading for part in used]),
-            # The subtracted value is as uncertain as a line drawn by hand, independently in each run.
+            # the subtracted value is as uncertain as a line drawn by hand, independently in each run
             zero="per_run" if len({part.rest for part in used}) > 1 else None,
         ),
         runs,

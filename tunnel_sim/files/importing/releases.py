@@ -1,8 +1,8 @@
 """The start and end of runs in a record.
 
-A run is a free decay: a series of swings, none much larger than the one before. It begins where a hand has held or
-pulled the body, or where a tap has made the swings grow at once. Every candidate is judged by its own largest
-swing and by the noise, never by the largest swing of the record. A record without a release is one run.
+A run is a free decay: a series of swings, none much larger than the previous one. It begins where a hand has
+held or pulled the body, or where a tap has made the swings grow at once. Every candidate is judged by its own
+largest swing and by the noise, never by the largest swing of the record. A record without a release is one run.
 """
 
 from __future__ import annotations
@@ -21,33 +21,34 @@ from tunnel_sim.files.importing.swings import Swings, noise_of, swings_of
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.quantities import Angles, PerSample, Rates, Times
 
-_BAND = 0.05  # of the largest excursion of a run: a smaller one counts as rest
+_BAND = 0.05  # share of the largest excursion of a run: a smaller one counts as rest
 _NOISES = 5.0  # standard deviations: smaller excursions are noise
-_CENTRED = 2  # estimates of the centre
+_CENTRED = 2  # number of estimates of the centre
 _LONGER = 1.8  # usual half cycles: no free motion takes as long from crossing to crossing
-_RESTED = 3.0  # usual half cycles: a rest, a hold or a pull, whatever the swings after it
-_GROWN = 1.5  # times the previous swings: no free decay grows as much within half a cycle
-_TAPPED = 2.0  # times the largest of the swings before: growth without a pause that is not chance
-_BEFORE = 10  # swings before a release, to which it is compared
-_GROWS_FOR = 3  # swings: a tap acts no longer
-_STILL_GROWING = 1.1  # times the previous swing: the hand has not let go
+_RESTED = 3.0  # usual half cycles: a rest, a hold or a pull, whatever the following swings
+_GROWN = 1.5  # multiple of the previous swings: no free decay grows as much within half a cycle
+_TAPPED = 2.0  # multiple of the largest previous swing: growth without a pause that is not chance
+_BEFORE = 10  # number of swings before a release that are compared with it
+_GROWS_FOR = 3  # number of swings: a tap acts no longer
+_STILL_GROWING = 1.1  # multiple of the previous swing: the hand has not let go
 _LEAST_HALVES = 6  # half cycles: a shorter motion is not a run
-_VISIBLE = 2.0  # times the least swing: noise alone does not reach it
+_VISIBLE = 2.0  # multiple of the least swing: noise alone does not reach it
 _ROUGH = 0.25  # median second difference of the logarithms of swings: a free decay is smoother
-_EVEN = 0.05  # the same, of a decay that random motion does not imitate
-_ODD = 8.0  # times the median of swings at random: none is larger
-_AT_TURN = 0.005  # of an excursion: the reading stays as near the turning point while the body is held
-_HELD = 0.5  # of a half cycle: a free turning point is not that flat for longer
-_FALLING = 0.75  # share of swings smaller than the one before: half of them at random
-_GOING_ON = 0.3  # of a swing: the next one would be larger, if nothing stopped the body
-_CUT_SHORT = 0.7  # of the expected swing: something else than friction has ended it
-_OVER = 0.3  # of the expected swing: what follows is not the same motion
-_UNSETTLED = 0.2  # of the swings after a release, in which another motion may die out
-_LITTLE = 0.3  # of the first swing: a random moment may make smaller ones grow again
-_DIED_OUT = 0.1  # of the largest swing
+_EVEN = 0.05  # the same for a decay that random motion does not imitate
+_ODD = 8.0  # multiple of the median of random swings: none is larger
+# share of an excursion: the reading stays this close to the turning point while the body is held
+_AT_TURN = 0.005
+_HELD = 0.5  # share of a half cycle: a free turning point is not as flat for longer
+_FALLING = 0.75  # share of swings that are smaller than the previous one: half of random swings
+_GOING_ON = 0.3  # share of a swing: the next one would be larger unless the body was stopped
+_CUT_SHORT = 0.7  # share of the expected swing: something other than friction has ended the motion
+_OVER = 0.3  # share of the expected swing: a different motion follows
+_UNSETTLED = 0.2  # share of the swings after a release in which another motion may die out
+_LITTLE = 0.3  # share of the first swing: a random moment may make smaller swings grow again
+_DIED_OUT = 0.1  # share of the largest swing
 _OTHER = 1.5  # ratio of half periods: the motion of something else
-_SMALL = 0.2  # of the swing of the longest run
-_BRIEF = 0.5  # of the duration of the longest run: a knock is over sooner
+_SMALL = 0.2  # share of the swing of the longest run
+_BRIEF = 0.5  # share of the duration of the longest run: a knock is shorter
 
 
 @dataclass(frozen=True)
@@ -55,10 +56,10 @@ class RecordPiece:
     """A run in a record: the index of its first sample, and the index after its last one.
 
     Args:
-        doubt: why it is left out, although the motion decays; empty: it is a run.
-        held: by which a hand held the body after the largest reading, s; these samples are left out.
-        stopped: whether something ends the free motion before the record ends.
-        again: index of a second release within the run, where the file names it as one; 0: there is none.
+        doubt: why the piece is left out although the motion decays; empty: it is a run.
+        held: time for which a hand held the body after the largest reading, s; these samples are left out.
+        stopped: whether the free motion is ended before the record ends.
+        again: index of a second release within a run that the file names as one; 0: there is none.
     """
 
     first: int
@@ -73,7 +74,7 @@ def find_runs(time_s: Times, reading: PerSample, drift: float = 0.0) -> list[Rec
     """The runs of a record: one for each release; the whole record if no hand is detected in it.
 
     Args:
-        drift: greatest drift of its centre, in the unit of the reading.
+        drift: greatest drift of the centre, in the unit of the reading.
     """
     noise = max(_NOISES * noise_of(reading), drift)
     centred = _centred(reading, noise)
@@ -82,7 +83,7 @@ def find_runs(time_s: Times, reading: PerSample, drift: float = 0.0) -> list[Rec
         away, starts, ends = centred
         crossings = 0.5 * (time_s[ends[:-1] - 1] + time_s[starts[1:]])
         half = float(np.median(np.diff(crossings)))
-        # Dry friction may hold the body beside the centre: a last stretch of one sign that long is a rest.
+        # dry friction may hold the body off the centre: a last stretch of one sign this long is a rest
         moved = starts[-1] if time_s[ends[-1] - 1] - time_s[starts[-1]] > _LONGER * half else ends[-1]
         if noise <= _BAND * float(np.abs(away).max()):  # else the motion continues in the noise
             end = _without_long_rest(time_s, 0, int(moved))
@@ -98,12 +99,12 @@ class _Decay:
     """A series of swings that decay, by the indices of extremes.
 
     Args:
-        hand: the extreme at which a hand begins to act before it.
+        hand: the extreme at which a hand begins to act before the decay.
         start: the extreme of the release.
         count: number of swings that exceed the noise and a share of the largest one.
-        until: the extreme at which something else begins, or the last one.
-        doubt: why it is not a run; empty: it is one.
-        pushed: whether a push ends it, after which the body swings on.
+        until: the extreme at which another motion begins, or the last one.
+        doubt: why the decay is not a run; empty: it is a run.
+        pushed: whether a push ends the decay, after which the body continues to swing.
     """
 
     hand: int
@@ -115,7 +116,7 @@ class _Decay:
 
     @property
     def whole(self) -> bool:
-        """Whether no hand acts before it."""
+        """Whether no hand acts before the decay."""
         return self.hand < 0
 
     def goes_on(self, swings: Swings) -> bool:
@@ -123,21 +124,21 @@ class _Decay:
         return self.whole and self.stopped(swings) is None
 
     def stopped(self, swings: Swings) -> int | None:
-        """The last extreme before something ends the motion, which would still swing; None if it dies out."""
+        """The last extreme before the motion is ended while still swinging; None if it dies out."""
         size, until = swings.size, self.until
         usual = float(np.median(swings.usual[self.start : self.start + self.count]))
         rests = swings.stay[until] > _RESTED * usual
         # The last swing of a record that ends in motion is not whole.
         shown = size[self.start : until] if until < size.size or rests else size[self.start : -1]
         sizes = np.append(shown, [0.0] if until < size.size or rests else [])
-        # Where nothing follows, a motion that has almost died out may rest.
+        # if nothing follows, a motion that has almost died out may rest
         least = _DIED_OUT * float(shown.max()) if until >= size.size else 0.0
         for k in range(max(2, self.count - 2), sizes.size):
             expected = 2.0 * sizes[k - 1] - sizes[k - 2]
             if sizes[k - 1] <= max(_VISIBLE * swings.least, least):
                 break
             if self.start + k == until < size.size and not rests and size[until] < _GROWN * expected:
-                sizes[k] = size[until]  # something was seen there, and the motion goes on
+                sizes[k] = size[until]  # another motion was seen there, and the motion goes on
             ends_here = (
                 sizes[k] < _CUT_SHORT * expected and sizes[k + 1 : k + 4].max(initial=0.0) < _OVER * expected
             )
@@ -146,12 +147,12 @@ class _Decay:
         return None
 
     def lasts(self, swings: Swings) -> float:
-        """Duration of its visible swings, s."""
+        """Duration of the visible swings, s."""
         return float(swings.lasts[self.start : self.start + self.count].sum())
 
 
 def _decays(swings: Swings) -> list[_Decay]:
-    """Every series of swings that decay, in their order."""
+    """Every series of decaying swings, in their order."""
     size, count = swings.size, swings.size.size
     breaks: list[tuple[int, int]] = []
     since, k = 0, 0
@@ -186,7 +187,7 @@ def _decays(swings: Swings) -> list[_Decay]:
 def _pushed(sizes: PerSample, swings: Swings) -> int:
     """The first swing that a push enlarges within an even decay; 0 if there is none.
 
-    Swings that grow slowly are those of a second mode, and swings that vary at random are those of the wind.
+    Slowly growing swings belong to a second mode, and randomly varying swings to the wind.
     """
     smallest = np.minimum.accumulate(sizes)
     grown = sizes > np.maximum(_GROWN * swings.sampled * smallest, smallest + swings.least)
@@ -197,7 +198,7 @@ def _pushed(sizes: PerSample, swings: Swings) -> int:
 
 
 def _settled(swings: Swings, start: int, until: int) -> int:
-    """The number of swings until a motion of something else has died out, on which a longer one remains."""
+    """The number of swings until another motion, on top of a longer one, has died out."""
     sizes, slow = swings.size[start:until], swings.slow[start:until]
     later = np.maximum.accumulate(sizes[::-1])[::-1]
     even = np.flatnonzero((later[1:] <= _STILL_GROWING * swings.sampled * sizes[:-1]) & ~slow[:-1])
@@ -207,7 +208,7 @@ def _settled(swings: Swings, start: int, until: int) -> int:
 
 
 def _release_at(swings: Swings, k: int, since: int) -> int | None:
-    """The extreme of a release, if something other than a free motion acts at an extreme; None if not.
+    """The extreme of a release, if a motion other than a free one acts at an extreme; None if not.
 
     Args:
         since: the extreme of the previous release.
@@ -216,7 +217,7 @@ def _release_at(swings: Swings, k: int, since: int) -> int | None:
     pulled = swings.across[k - 1] / usual[k - 1] if k > since else 0.0
     paused = bool(swings.held[k]) or (k > since and bool(swings.slow[k - 1]))
     rested = stay[k] > _RESTED * usual[k] or pulled > _RESTED or (k == 1 and bool(swings.slow[0]))
-    begins = swings.begins_between and since == 0  # the first swing is not a whole one
+    begins = swings.begins_between and since == 0  # the first swing is incomplete
     earlier = size[max(since, k - _BEFORE) : k].max(initial=0.0)
     latest = size[max(since, k - 2) : k].max(initial=0.0)
     if begins and k <= 2:
@@ -224,7 +225,7 @@ def _release_at(swings: Swings, k: int, since: int) -> int | None:
     at, most = k, size.size if paused or rested else k + _GROWS_FOR
     while at + 1 < min(size.size, most) and size[at + 1] > _STILL_GROWING * swings.sampled * size[at]:
         at += 1
-    # Random motion pauses by chance; a swing that decays does not.
+    # random motion pauses by chance; a decaying swing does not
     if k and size[at] <= _TAPPED * _random_before(swings, k):
         return None
     if rested or (paused and size[at] > _GROWN * earlier):
@@ -238,7 +239,7 @@ def _release_at(swings: Swings, k: int, since: int) -> int | None:
 
 
 def _random_before(swings: Swings, k: int) -> float:
-    """The largest of the swings before an extreme, if they vary at random; 0 if they decay, or a hand acts."""
+    """The largest swing before an extreme if these swings vary at random; 0 if they decay, or a hand acts."""
     part = slice(max(0, k - _BEFORE), k)
     sizes = swings.size[part][~swings.slow[part]]
     if sizes.size < _LEAST_HALVES or _bend(sizes) <= _ROUGH or np.mean(np.diff(sizes) < 0.0) >= _FALLING:
@@ -247,7 +248,7 @@ def _random_before(swings: Swings, k: int) -> float:
 
 
 def _is_even(sizes: PerSample) -> bool:
-    """Whether swings decay so evenly that a single slow one is a pull, however short."""
+    """Whether swings decay so evenly that a single slow swing, however short, is a pull."""
     falling = float(np.mean(np.diff(sizes) < 0.0)) if sizes.size > 1 else 0.0
     return sizes.size >= _LEAST_HALVES and _bend(sizes) <= _EVEN and falling >= _FALLING
 
@@ -258,7 +259,7 @@ def _bend(sizes: PerSample) -> float:
 
 
 def _is_decay(moving: PerSample, sizes: PerSample, swings: Swings, start: int, *, followed: bool) -> bool:
-    """Whether swings decay evenly, and none after them is larger than the first one, or grows much again.
+    """Whether swings decay evenly, and no later swing is larger than the first one, or grows much again.
 
     Args:
         followed: whether another release follows. A single large swing may then be the pull towards it.
@@ -281,12 +282,12 @@ def _is_decay(moving: PerSample, sizes: PerSample, swings: Swings, start: int, *
 def _piece(
     time_s: Times, reading: PerSample, swings: Swings, decay: _Decay, following: _Decay | None
 ) -> RecordPiece:
-    """The samples of a decay, from the release until something else acts, the body rests, or the record ends."""
+    """The samples of a decay, from the release until another moment acts, the body rests, or the record ends."""
     noise, usual = noise_of(reading), float(np.median(swings.usual[decay.start : decay.start + decay.count]))
     turns = swings.at[decay.start : decay.start + decay.count + 1]
     first, held = 0, 0.0
     if not decay.whole:
-        # From the first sample of the largest reading, or from the last one of a hold.
+        # from the first sample of the largest reading, or from the last sample of a hold
         turn, size = int(turns[0]), 0.5 * float(swings.size[decay.start])
         part = slice(int(swings.reached[decay.start]), int(swings.departs[decay.start]) + 1)
         most = max(_AT_TURN * size, swings.least)
@@ -308,7 +309,7 @@ def _piece(
     if noise * _NOISES <= _BAND * 0.5 * swings.size[decay.start]:  # else the motion continues in the noise
         last = _without_long_rest(time_s, first, moved + 1)
     if following is not None:
-        # The hand acts from the first extreme on, from which it moves the body noticeably.
+        # the hand acts from the first extreme at which it moves the body noticeably
         after = slice(decay.until, following.start + 1)
         acts = np.flatnonzero(swings.size[after] > _BAND * swings.size[following.start])
         at = int(swings.departs[decay.until + int(acts[0])])
@@ -318,27 +319,27 @@ def _piece(
     return RecordPiece(first, last, decay.doubt, held)
 
 
-def _judged(found: Sequence[_Decay], swings: Swings, reading: PerSample) -> list[_Decay]:
+def _judged(decays: Sequence[_Decay], swings: Swings, reading: PerSample) -> list[_Decay]:
     """The decays that are runs; with a doubt also the motion of something else.
 
-    A brief motion is not a run if it swings at another frequency than the longest one; nor if it is small, beside
-    the centre of the longest one and just before a release: a hand holds the body there.
+    A brief motion is not a run if its frequency differs from the longest one's. Neither is a small motion off
+    the centre of the longest one, just before a release: a hand holds the body there.
     """
-    if len(found) < 2:
-        return list(found)
-    lasts = np.array([decay.lasts(swings) for decay in found])
-    halves = lasts / [decay.count for decay in found]
-    sizes = np.array([swings.size[decay.start] for decay in found])
-    at = [reading[swings.at[decay.start : decay.start + decay.count + 1]] for decay in found]
+    if len(decays) < 2:
+        return list(decays)
+    lasts = np.array([decay.lasts(swings) for decay in decays])
+    halves = lasts / [decay.count for decay in decays]
+    sizes = np.array([swings.size[decay.start] for decay in decays])
+    at = [reading[swings.at[decay.start : decay.start + decay.count + 1]] for decay in decays]
     centres = np.array([float(np.median(0.5 * (turns[1:] + turns[:-1]))) for turns in at])
     most = int(np.argmax(lasts))
     brief = lasts < _BRIEF * lasts[most]
     other = (halves > _OTHER * halves[most]) | (halves < halves[most] / _OTHER)
     small = sizes < _SMALL * sizes[most]
-    following = np.append([found[k + 1].hand <= found[k].until for k in range(len(found) - 1)], [False])
+    following = np.append([decays[k + 1].hand <= decays[k].until for k in range(len(decays) - 1)], [False])
     beside = (np.abs(centres - centres[most]) > sizes) & following
     judged = []
-    for k, decay in enumerate(found):
+    for k, decay in enumerate(decays):
         if brief[k] and small[k] and (beside[k] or other[k]):
             continue
         if brief[k] and other[k]:
@@ -356,7 +357,7 @@ def find_runs_of_rate(time_s: Times, rate: Rates) -> list[RecordPiece]:
     centred = _centred(rate, noise)
     if centred is None:
         return whole
-    # A hand shows in the angle: the body is held, or pulled aside for longer than it takes to swing back.
+    # a hand shows in the angle: the body is held, or pulled aside for longer than it takes to swing back
     rate, starts, ends = centred
     angle = _without_drift(
         time_s,
@@ -383,7 +384,7 @@ def find_runs_of_rate(time_s: Times, rate: Rates) -> list[RecordPiece]:
 
 
 def _let_go(angle: Angles, piece: RecordPiece, noise: float) -> int:
-    """The first largest angle from which on the excursions no longer grow."""
+    """The first largest angle after which the excursions no longer grow."""
     centred = _centred(angle[: piece.last], noise)
     if centred is None:
         return piece.first
@@ -398,7 +399,7 @@ def _let_go(angle: Angles, piece: RecordPiece, noise: float) -> int:
 def with_added(
     time_s: Times, found: Mapping[str, RecordPiece], stated: Sequence[Stretch]
 ) -> dict[str, RecordPiece]:
-    """The runs of a record by name, with the user's additions; an added release ends the run before it.
+    """The runs of a record by name, with the user's additions; an added release ends the previous run.
 
     Args:
         stated: the added runs, with their start, s.
@@ -416,7 +417,7 @@ def with_added(
 
 
 def stated_piece(time_s: Times, found: RecordPiece, stated: Stretch, where: str) -> RecordPiece:
-    """A run with stated start and end; refused if fewer than two samples are in between."""
+    """A run with stated start and end; refused if it contains fewer than two samples."""
     if stated.start is None and stated.end is None:
         return found
     start = time_s[found.first] if stated.start is None else stated.start
@@ -443,7 +444,7 @@ def _without_drift(time_s: Times, angle: Angles, starts: NDArray[np.intp], ends:
     if at.size < _LEAST_HALVES:
         return angle
     turns = angle[at]
-    # From three consecutive turning points, so that a decay cancels.
+    # from three consecutive turning points, so that a decay cancels
     centres, times = 0.25 * (turns[:-2] + 2.0 * turns[1:-1] + turns[2:]), time_s[at[1:-1]]
     half = times.size // 2
     slopes = (centres[half:] - centres[: times.size - half]) / (times[half:] - times[: times.size - half])
@@ -458,7 +459,7 @@ def _centred(reading: PerSample, noise: float) -> tuple[PerSample, NDArray[np.in
         starts, ends = _excursions(away, noise)
         if starts.size < _LEAST_HALVES:
             return None
-        # A hold or a pull shifts the median; most swings have their centre between two turning points.
+        # a hold or a pull shifts the median; most swings have their centre between two turning points
         swings = (away[a:b] for a, b in zip(starts, ends, strict=True))
         turns = np.array([swing[int(np.argmax(np.abs(swing)))] for swing in swings])
         away = away - np.median(0.5 * (turns[1:] + turns[:-1]))

@@ -6,13 +6,14 @@ from __future__ import annotations
 class ImportRemark(str):
     """A remark with its short form, to be read beside the table of runs.
 
-    A plain text is a remark whose short form is itself. Text and short form are single lines.
+    A plain text is a remark and its own short form. Text and short form are single lines.
 
     Args:
         text: the whole remark.
         short: the remark without the numbers that the table shows; None: the whole remark.
         doubt: whether the user has to judge it; the text then names the option that settles it.
-        motion: a doubt about the motion of one run without its option, for a chart of the run; empty for others.
+        motion: a doubt about the motion of one run, without its option, for a chart of the run; empty for other
+            remarks.
     """
 
     __slots__ = ("doubt", "motion", "short")
@@ -36,5 +37,5 @@ def doubt(text: str, short: str | None = None) -> ImportRemark:
 
 
 def doubt_of_motion(fact: str, settled: str = "", short: str | None = None) -> ImportRemark:
-    """A doubt about the motion of one run: the fact, and the option that settles it, empty where none does."""
+    """A doubt about the motion of one run: the fact, and the option that settles it, empty if there is none."""
     return ImportRemark(f"{fact}; {settled}" if settled else fact, short, doubt=True, motion=fact)

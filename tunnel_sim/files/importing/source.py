@@ -27,10 +27,10 @@ from tunnel_sim.vocabulary.errors import TunnelError, counted, shown
 def read_guarded(
     reader: str | None, content: bytes, where: str, choices: ImportChoices
 ) -> tuple[list[Table], dict[str, str]]:
-    """The tables of a file, read in the kept process, and what a table of text is known to be.
+    """The tables of a file, read in the kept process, and the known properties of a table of text.
 
     Args:
-        reader: its place ``module:name``; None: text.
+        reader: place ``module:name`` of the reader; None: text.
     """
     dialect = {"delimiter": choices.delimiter, "decimal": choices.decimal}
     found, arrays = read_apart(_read, {"reader": reader, "where": where, "dialect": dialect}, content, where)
@@ -62,7 +62,7 @@ def _read(request: dict[str, Any], contents: list[bytes]) -> Message:
 
 
 def _text_tables(content: bytes, where: str, choices: ImportChoices) -> tuple[list[Table], dict[str, str]]:
-    """The tables of a file of text, and what they are known to be; LabVIEW's have headers of their own."""
+    """The tables of a file of text, and its known properties; LabVIEW's files have headers of their own."""
     if content.startswith(MAGIC):
         return read_labview_tables(content, where)
     return read_text_tables(content, where, choices)
@@ -92,7 +92,7 @@ _BEGINNINGS = {
 
 
 def read_source(path: Path, choices: ImportChoices) -> Source:
-    """Read a file of any known format; the meaning of its columns is not known yet."""
+    """Read a file of any known format; the meaning of its columns is found later."""
     where = shown(path)
     packed = path.suffix.lower() == PACKED
     ending = Path(path.stem if packed else path.name).suffix.lower()
@@ -128,7 +128,7 @@ def read_source(path: Path, choices: ImportChoices) -> Source:
             channels.append(channel)
         table = replace(table, channels=tuple(channels), remarks=tuple(said))
         parts = (with_input_facts(part) for part in by_run(table))
-        # A column that names the runs, or states the input, may be alone in its table.
+        # a column that names the runs, or states the input, may be alone in its table
         readable += [part for part in parts if part.channels]
     if not readable:
         remedy = "name a file with times and angles"

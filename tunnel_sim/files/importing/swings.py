@@ -1,7 +1,7 @@
 """The swings of a reading, from extreme to extreme, whatever their size.
 
-A swing needs no centre and no largest swing of its record: an extreme counts if the reading returns from it by more
-than the noise, and by more than a share of the motion near it.
+A swing needs no centre and no reference swing of its record: an extreme counts if the reading returns from it
+by more than the noise, and by more than a share of the motion near it.
 """
 
 from __future__ import annotations
@@ -15,22 +15,22 @@ from numpy.typing import NDArray
 from tunnel_sim.vocabulary.quantities import PerSample, Seconds, Times
 from tunnel_sim.vocabulary.record import Array
 
-_NOISE_OF = 200_000  # samples for the estimate of the noise
-_STRETCH = 64  # samples whose mean fourth difference is one estimate of it
+_NOISE_OF = 200_000  # number of samples for the estimate of the noise
+_STRETCH = 64  # number of samples with one estimate of the noise, by their mean fourth difference
 _NOISES = 6.0  # standard deviations: white noise returns by as much in one of 1e4 half cycles
-_ROUNDING = 1e-12  # of the range: rounding alone
+_ROUNDING = 1e-12  # share of the range: rounding alone
 _TINY = 1e-200  # s, or the unit of the reading: below it quotients overflow
-_LEVELS = 1.5  # steps of a sensor that rounds: its last digit toggles
-_STEPPED = 0.2  # share of unchanged readings, from which a sensor rounds
-_SHARE = 0.1  # of the range near an extreme: a smaller return is a ripple on the swing
-_FINE, _COARSE = 64, 12  # blocks of a half cycle: of a clean reading, and of a noisy one
-_FINE_ENOUGH = 0.02  # of the range of a record: noise that needs no wider blocks
-_NEAR = 0.05  # of a swing: the body is still, or already, at the extreme
-_NEAREST = 0.25  # of a swing, at most: where the noise is large
-_AHEAD = 7  # swings after an extreme, whose median is the usual half period there
-_USUAL_ACROSS = 0.713  # of a half period: a sinusoid from 5 % to 95 % of its swing
-_SLOW = 1.8  # times the usual time across: a hand pulls, and no free motion takes as long
-_SLOWER = 1.5  # times the time of a free motion: a pull at the start of a record takes longer
+_LEVELS = 1.5  # steps of a rounding sensor: its last digit toggles
+_STEPPED = 0.2  # share of unchanged readings from which a sensor rounds
+_SHARE = 0.1  # share of the range near an extreme: a smaller return is a ripple on the swing
+_FINE, _COARSE = 64, 12  # number of blocks in a half cycle: for a clean reading, and for a noisy one
+_FINE_ENOUGH = 0.02  # share of the range of a record: less noise needs no wider blocks
+_NEAR = 0.05  # share of a swing: the body is still, or already, at the extreme
+_NEAREST = 0.25  # maximum share of a swing, for large noise
+_AHEAD = 7  # number of swings after an extreme for the median that is the usual half period there
+_USUAL_ACROSS = 0.713  # share of a half period: a sinusoid from 5 % to 95 % of its swing
+_SLOW = 1.8  # multiple of the usual time across: a hand pulls, and no free motion takes as long
+_SLOWER = 1.5  # multiple of the time of a free motion: a pull at the start of a record takes longer
 _BETWEEN = 0.6  # half periods before the first extreme: the record may begin within a swing
 _LATE = 1.2  # half periods before the first extreme: not one swing fits into them, with some slack
 _HELD = 1.0  # half periods at an extreme: a sinusoid stays for 0.29
@@ -39,7 +39,7 @@ _HELD = 1.0  # half periods at an extreme: a sinusoid stays for 0.29
 def noise_of(reading: PerSample) -> float:
     """The standard deviation of the white noise, by fourth differences, which hardly contain a swing.
 
-    The median over short stretches leaves out what is sudden; their means are exact for rounded readings, too.
+    The median over short stretches ignores sudden changes; their means are exact for rounded readings, too.
     """
     some = np.abs(np.diff(reading[:_NOISE_OF], 4))
     if not some.size:
@@ -57,18 +57,18 @@ class Swings:
         at: index of each extreme, shape (m,).
         left: index of the last sample near the extreme before the swing away from it, shape (m,).
         reached: index of the first sample near the extreme, shape (m,).
-        size: of the swing from each extreme to the next one, in the unit of the reading, shape (m - 1,).
+        size: size of the swing from each extreme to the next, in the unit of the reading, shape (m - 1,).
         lasts: time of the swing, shape (m - 1,), s.
         usual: median of that time over the following swings, shape (m - 1,), s.
-        across: time of the swing from leaving one extreme to reaching the next one, as a time of a whole swing of a
-            sinusoid, shape (m - 1,), s.
+        across: time of the swing from leaving one extreme to reaching the next, converted to the time of a
+            whole swing of a sinusoid, shape (m - 1,), s.
         stay: time near each extreme, shape (m,), s.
         slow: whether the swing takes too long for a free motion, shape (m - 1,).
         held: whether the body stays too long at the extreme for a free motion, shape (m,).
         least: smallest size that the noise cannot produce.
-        sampled: greatest ratio of two equal swings, as sampled.
+        sampled: greatest ratio of two equal swings due to sampling.
         begins_between: whether the record may begin between two extremes.
-        begins_late: whether it begins with something else than the first swing.
+        begins_late: whether the record begins with something other than the first swing.
     """
 
     at: NDArray[np.intp]
@@ -91,8 +91,8 @@ def swings_of(time_s: Times, reading: PerSample, half: Seconds, drift: float = 0
     """The swings of a reading; None if it has fewer than two.
 
     Args:
-        half: half a period of its strongest motion; 0: not known.
-        drift: greatest drift of its centre, in the unit of the reading.
+        half: half a period of the strongest motion; 0: not known.
+        drift: greatest drift of the centre, in the unit of the reading.
     """
     noise, step = noise_of(reading), float(np.median(np.diff(time_s)))
     span = float(np.ptp(reading))
@@ -143,14 +143,14 @@ def swings_of(time_s: Times, reading: PerSample, half: Seconds, drift: float = 0
 
 
 def _level(reading: PerSample) -> float:
-    """The step of a sensor that often repeats its reading; 0 for others."""
+    """The step of a sensor that often repeats its reading; 0 for other sensors."""
     steps = np.abs(np.diff(reading[:_NOISE_OF]))
     moved = steps[steps > 0.0]
     return float(moved.min()) if moved.size and moved.size < (1.0 - _STEPPED) * steps.size else 0.0
 
 
 def _without_gaps(time_s: Times) -> Array:
-    """The times without the gaps in which samples are missing: nobody knows what the body did in them."""
+    """The times, without gaps of missing samples: the motion during a gap is unknown."""
     steps = np.diff(time_s)
     usual = float(np.median(steps))
     kept = np.where(steps > 8.0 * usual, usual, steps)
@@ -158,7 +158,7 @@ def _without_gaps(time_s: Times) -> Array:
 
 
 def _ranges(values: Array, width: int) -> Array:
-    """The range of values near each one, over three blocks of a width."""
+    """The range of values near each value, over three blocks of a width."""
     blocks = np.arange(0, values.size, width)
     top, bottom = np.maximum.reduceat(values, blocks), np.minimum.reduceat(values, blocks)
     top = np.max([top, np.append(top[1:], top[-1]), np.append(top[0], top[:-1])], axis=0)
@@ -167,7 +167,7 @@ def _ranges(values: Array, width: int) -> Array:
 
 
 def _turns(values: Array, least: Array) -> NDArray[np.intp]:
-    """Indices of alternate extremes; the values return from each by more than its least."""
+    """Indices of alternate extremes; the values return from each by more than its threshold."""
     steps = np.flatnonzero(np.diff(values))
     signs = np.sign(np.diff(values)[steps])
     inner = steps[1:][signs[1:] != signs[:-1]]
@@ -209,7 +209,7 @@ def _in_reading(turns: NDArray[np.intp], block: int, means: Array, reading: PerS
 def _ends(
     turns: NDArray[np.intp], means: Array, block: int, least: float
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """The last sample near each extreme, and the first one; nearer than the noise is near."""
+    """The last sample near each extreme, and the first one; "near" is limited by the noise."""
     first, last = int(turns[0]), int(turns[-1])
     swing = np.repeat(np.arange(turns.size - 1), np.diff(turns))
     place = np.arange(first, last)
@@ -219,7 +219,7 @@ def _ends(
     left = np.maximum.reduceat(np.where(done <= near, place, 0), turns[:-1] - first)
     arrived = np.minimum.reduceat(np.where(done >= 1.0 - near, place, means.size), turns[:-1] - first)
     arrived = np.minimum(arrived, turns[1:])
-    # Before the first extreme and after the last one: as far as the reading stays near.
+    # before the first extreme and after the last: as far as the reading stays near
     away = np.flatnonzero(np.abs(means[:first] - means[first]) > near[0] * abs(end[0] - start[0]))
     reached = int(away[-1]) + 1 if away.size else 0
     away = np.flatnonzero(np.abs(means[last:] - means[last]) > near[-1] * abs(end[-1] - start[-1]))

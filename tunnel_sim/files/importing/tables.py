@@ -28,8 +28,8 @@ _RUN_NAMES = re.compile(
     r"(mess(ung|reihe)|versuchs)[ _]?(nr|nummer)\.?"
 )
 LEAST_ROWS = 16
-"""Fewest rows of a record: a shorter table beside longer ones holds conditions or sizes."""
-_LEAST_EACH = 8  # rows of a run, on average: a column that changes more often numbers something else
+"""Minimum number of rows of a record: a shorter table beside longer ones holds conditions or sizes."""
+_LEAST_EACH = 8  # rows of a run, on average: a column that changes more often does not number runs
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,9 +37,9 @@ class Channel:
     """One column of a table.
 
     Args:
-        values: in the unit of the file; NaN where there is no number.
-        unit: one of `units.UNITS`, another text, or empty where none is stated.
-        place: number of the column in the file, from 1 on; 0 where the file does not number its columns.
+        values: values in the unit of the file; NaN for a missing number.
+        unit: one of `units.UNITS`, another text, or empty if none is stated.
+        place: number of the column in the file, from 1 on; 0 if the file does not number its columns.
     """
 
     name: str
@@ -57,7 +57,7 @@ class Channel:
 
     @property
     def quoted(self) -> str:
-        """Its name in a message."""
+        """The column's name in a message."""
         return f"'{one_line(self.name, 40)}'"
 
 
@@ -66,12 +66,12 @@ class RunColumn:
     """A column in its role in a run.
 
     Args:
-        channel: as in the file; `NO_CHANNEL` where the file has no such column.
-        values: in the SI unit of the role, or in the unit of the file before that is known.
-        unit: of the channel, stated or assumed.
+        channel: channel of the file; `NO_CHANNEL` if the file has no such column.
+        values: values in the SI unit of the role, or in the unit of the file until that is known.
+        unit: unit of the channel, stated or assumed.
         role: ``time``, the quantity of a reading, or the kind of an input.
-        why: remarks on its choice and its numbers.
-        motion: that a reading is of.
+        why: remarks on the choice of the column and on its numbers.
+        motion: motion that a reading measures.
     """
 
     channel: Channel
@@ -90,16 +90,17 @@ class Table:
     """Columns of the same length.
 
     Args:
-        part: sheet, group, structure or run in the file; empty where the file contains one table.
+        part: sheet, group, structure or run in the file; empty if the file contains one table.
         facts: single numbers beside the columns, by name.
         remarks: how the table was read, and what was omitted.
         headed: whether the columns are named in the file.
-        named: whether the part is the file's name for a run, which the table then contains completely.
+        named: whether the part is the file's name for a run, which is then completely in the table.
         texts: single texts beside the columns, by name.
-        native: names of the columns that were sampled on the clock of the table, where the columns of a part have
-            several clocks; the part then has a table for each of them. Empty: all columns.
+        native: names of the columns that were sampled on the clock of the table, if the columns of a part have
+            several clocks; the part then has a table for each clock. Empty: all columns.
         apart: name, unit and reason of each column of the part that cannot be aligned with the clock of the table.
-        aligned: by column of another clock that was put onto the clock of the table: how, and how far off.
+        aligned: for each column of another clock that was put onto the clock of the table: how, and how far
+            off.
     """
 
     channels: tuple[Channel, ...]
@@ -115,7 +116,7 @@ class Table:
 
 
 def names_runs(heading: str) -> bool:
-    """Whether a column of that name gives the run of each row."""
+    """Whether a column of this name gives the run of each row."""
     return _RUN_NAMES.fullmatch(heading.strip()) is not None
 
 
@@ -143,7 +144,7 @@ def heading(channel: Channel) -> str:
 
 
 def with_input_facts(table: Table) -> Table:
-    """A table whose columns `INPUT_KEYS`, as an export writes them, are single numbers."""
+    """A table with single numbers for the columns `INPUT_KEYS`, as written by an export."""
     stated = [channel for channel in table.channels if channel.name in INPUT_FACTS]
     facts = {c.name: float(good[0]) for c in stated if (good := c.values[np.isfinite(c.values)]).size}
     channels = tuple(channel for channel in table.channels if channel not in stated)

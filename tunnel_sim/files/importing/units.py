@@ -62,14 +62,14 @@ _ALIKE = str.maketrans(
 _GERMAN = re.compile(
     r"(?i)winkel|drehung|ausschlag|auslenkung|lage|gier|steifigkeit|feder|geschwindigkeit|rate"
 )
-"""Names beside which ``grad`` is the German degree; alone it may be the gon (a turn has 400)."""
+"""Names with which ``grad`` is the German degree; alone it may be the gon (a turn has 400)."""
 _BRACKETS = re.compile(r"\s*[(\[{<]\s*(?:in\s+)?([^()\[\]{}<>]*?)\s*[)\]}>]")
 _IN = re.compile(r"(?i)(?<=\S)[\s_]+in[\s_]+(?=\S)")
 _SEPARATOR = re.compile(r"(?<=\w)(?:\s+[-–—]\s+|[\s_,:]*[\s_,:/][\s_,:]*)")
 _PER = re.compile(r"(?i)[\s_]per[\s_]")
 _PER_TIME = ("s", "sec", "min", "h")
 _AMBIGUOUS = ("min", "h")
-"""After a blank or an underline also a minimum or a height: of times alone they are units there."""
+"""After a blank or an underscore also a minimum or a height: only for times are they units there."""
 _TIMES = re.compile(
     r"(?i)(?<![a-z])(t|time|timed|times|timestamp|zeit|temps|tiempo|tempo|elapsed|uhrzeit)(?![a-z])"
 )
@@ -89,7 +89,7 @@ def known_unit(text: str) -> str | None:
 
 
 def squeezed(text: str) -> str:
-    """A unit in lower case, without blanks and dots, and with plain digits for raised ones."""
+    """A unit in lower case, without blanks and dots, and with plain digits for superscripts."""
     return text.lower().translate(_ALIKE)
 
 
@@ -198,7 +198,7 @@ def _after_separator(heading: str) -> tuple[str, str] | None:
         blank = not re.search(r"[,:/]", found[0])
         if blank and unit in _AMBIGUOUS and not names_a_time(name):
             continue
-        # "t/s" is a time in s, and neither "F N/s" nor "flow_kg_s" is.
+        # "t/s" is a time in s, but "F N/s" and "flow_kg_s" are not times
         if place and "," not in found[0] and word.lower() in _PER_TIME and not (blank and names_a_time(name)):
             continue
         return name, unit

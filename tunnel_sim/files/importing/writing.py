@@ -1,4 +1,4 @@
-"""Step 5 of an import: write the campaign, with properties that are not stated as comments."""
+"""Step 5 of an import: write the campaign, with unstated properties as comments."""
 
 from __future__ import annotations
 
@@ -57,8 +57,8 @@ def import_records(
     """Read files as instruments write them, and write them as a campaign: completely, or not at all.
 
     Args:
-        files: one or more, of any known format.
-        picture: draws the records, as PNG; None: no picture.
+        files: one or more files, of any known format.
+        picture: function that draws the records, as PNG; None: no picture.
     """
     name = one_line(Path(folder).resolve().name)
     imported = read_records([Path(path) for path in files], choices, conditions=conditions, name=name)
@@ -104,7 +104,7 @@ def originals(imported: Imported) -> list[str]:
 
 
 def campaign_text(document: Mapping[str, Any], originals: Sequence[str], driven: Collection[str]) -> str:
-    """``campaign.toml`` after comments on its originals; keys that are not stated are also comments.
+    """``campaign.toml`` after comments on its originals; unstated keys are comments, too.
 
     Args:
         driven: ids of the driven runs.
@@ -114,7 +114,7 @@ def campaign_text(document: Mapping[str, Any], originals: Sequence[str], driven:
     freedom = FREEDOMS[tables.get("sensor", {}).get("motion", "angle")]
 
     def comments(why: Mapping[str, str], stated: Collection[str]) -> list[str]:
-        """The keys that are not stated, as comments."""
+        """The unstated keys, as comments."""
         own = freedom.as_own({key: text for key, text in why.items() if key not in freedom.refused})
         return [f"# {key} =   # {freedom.words(text)}" for key, text in own.items() if key not in stated]
 

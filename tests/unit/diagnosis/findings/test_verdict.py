@@ -214,7 +214,7 @@ def test_the_credible_set_is_the_smallest_with_nine_tenths():
         ),
         (
             Predictions(held_out=0.98, under_load=0.02),
-            "leaves 2.0 % of the gap, as friction under load does where it follows another law",
+            "leaves 2.0 % of the gap: friction under load may follow another law",
         ),
         (Predictions(held_out=0.98, left=0.16), "leaves a residual of 16.0 % of the swing"),
         (Predictions(held_out=0.2, ahead=0.2, patched=0.2, left=0.09), ""),

@@ -94,7 +94,7 @@ def test_a_sound_effect_obeys_every_law(kind: type[Effect]) -> None:
         (Forgets, "JSON", "another"),
         (Wanders, "same seed", "differ"),
         (TooStiff, "integration step", "too|bound|changes by"),
-        (OfWrongSign, "states independently", "differs by"),
+        (OfWrongSign, "independently stated", "differs by"),
         (ActsOnFreeDecays, "driven runs only", "acts on a free decay"),
     ],
 )

@@ -16,8 +16,8 @@ from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import counted
 
 RUN_IDS = ("id", "run", "run_id")
-"""Members and attributes whose text is the name of the run that a group holds."""
-_MOST_CHANNELS = 256  # rows of a matrix: it is transposed so that they are fewer than its samples
+"""Members and attributes with a text that names the run in a group."""
+_MOST_CHANNELS = 256  # maximum number of rows of a matrix: it is transposed if it has more rows than columns
 
 
 def tables_of_arrays(
@@ -29,12 +29,12 @@ def tables_of_arrays(
 ) -> list[Table]:
     """Tables of arrays: arrays of the same group and length belong together.
 
-    Single numbers are facts of the tables of their group and below; the numbers of a group without records describe
-    the groups beside it.
+    Single numbers are facts of the tables of their group and of the groups below. In a group without records
+    they describe the other groups at its level.
 
     Args:
         arrays: by path, with ``/`` between groups; matrices hold one channel in each row or column.
-        texts: by path; every group's are beside all tables.
+        texts: texts by path; the texts of every group belong to all tables.
     """
     facts: dict[str, dict[str, float]] = {}
     groups: dict[tuple[str, int], list[Channel]] = {}
@@ -78,18 +78,19 @@ def tables_of_arrays(
 def _of_described(
     facts: Mapping[str, Mapping[str, float]], records: Collection[str]
 ) -> dict[str, dict[str, float]]:
-    """Numbers by the group that they describe: their own, or the one above if their own has no records."""
+    """Numbers by the group that they describe: their own, or the group above if their own has no records."""
     found: dict[str, dict[str, float]] = {}
     for group, numbers in facts.items():
         own = group == "" or any(name == group or name.startswith(f"{group}/") for name in records)
         inside = any(group.startswith(f"{name}/") for name in records)
-        one_of_several = group.endswith("]")  # an element of a list of runs does not describe another
+        # an element of a list of runs does not describe the other elements
+        one_of_several = group.endswith("]")
         above = group if own or inside or one_of_several else group.rpartition("/")[0]
         found.setdefault(above, {}).update(numbers)
     return found
 
 
 def check_size(count: int, where: str) -> None:
-    """Refuse arrays whose number of values, as stated in the file, is too large."""
+    """Refuse arrays with too many values, as stated in the file."""
     most = limits.DATA_BYTES // 8
     check_count(count, most, "numbers", where, "split the file, or leave out arrays that are not needed")

@@ -45,7 +45,7 @@ def _read_run(content: bytes, where: str, most: int) -> FileTable:
 
 
 def _read_tables(content: bytes, where: str) -> list[Table]:
-    """The table of a Parquet file, run by run where a column names the runs."""
+    """The table of a Parquet file, split into runs if a column names them."""
     schema = frame_schema(content, where, _REMEDY, rows=limits.RUN_SAMPLES, counted="samples")
     runs = next((name for name, kind in schema.items() if names_runs(name) and kind == pl.String), None)
     used = [name for name, kind in schema.items() if kind.is_numeric() or kind.is_temporal() or name == runs]
@@ -92,7 +92,7 @@ def _read_hdf5(content: bytes, where: str) -> list[Table]:
                 datasets[path] = item
             group = isinstance(item, h5py.Group)
             for name in item.attrs:
-                held = item.attrs.get_id(name)  # others are not read: a text may be in a damaged heap
+                held = item.attrs.get_id(name)  # other texts are not read: a text may be in a damaged heap
                 if held.dtype.kind in "iuf" and held.get_space().get_simple_extent_npoints() == 1:
                     folder = path if group else path.rpartition("/")[0]
                     attributes[f"{folder}/{name}".lstrip("/")] = np.asarray(item.attrs[name])
@@ -107,7 +107,7 @@ def _read_hdf5(content: bytes, where: str) -> list[Table]:
                         texts[f"{path}/{name}".lstrip("/")] = stated
 
         visit("", file)
-        file.visititems(visit)  # does not follow links, so nothing outside the file is opened
+        file.visititems(visit)  # links are not followed, so nothing outside the file is opened
         check_size(sum(int(np.prod(item.shape, dtype=float)) for item in datasets.values()), where)
         arrays = attributes
         for path, item in datasets.items():
@@ -169,7 +169,7 @@ def _read_mat(content: bytes, where: str) -> list[Table]:
 
 
 def _number_in(group: str, name: str, text: str) -> dict[str, NDArray[np.generic]]:
-    """The number stated by a text such as ``12 m/s``, by path; empty if it states none."""
+    """The number in a text such as ``12 m/s``, by path; empty if there is none."""
     found = facts_in([f"{name}: {text}"])
     # A unit may contain the character that separates the parts of a path.
     return {
@@ -218,7 +218,7 @@ def _read_tdms(content: bytes, where: str) -> list[Table]:
 
 
 def _tdms_wave(place: int, channel: Any) -> Waveform:
-    """A channel with the clock and the unit that its properties state."""
+    """A channel with the clock and the unit stated by its properties."""
     properties = channel.properties
     name, unit = split_unit(channel.name)
     stated = next((str(properties[key]).strip() for key in _TDMS_UNITS if properties.get(key)), "")

@@ -53,86 +53,88 @@ def _read_lines(content: bytes, where: str) -> list[Table]:
 
 
 def _tables(document: Any, where: str) -> list[Table]:
-    found = _Found()
-    _visit(document, "", found)
-    check_count(len(found.arrays), limits.COLUMNS, "arrays", where, "leave out arrays that are not needed")
-    check_size(sum(array.size for array in found.arrays.values()), where)
-    tables = tables_of_arrays(found.arrays, "JSON file", found.units, found.runs, found.texts)
+    content = _Found()
+    _visit(document, "", content)
+    check_count(len(content.arrays), limits.COLUMNS, "arrays", where, "leave out arrays that are not needed")
+    check_size(sum(array.size for array in content.arrays.values()), where)
+    tables = tables_of_arrays(content.arrays, "JSON file", content.units, content.runs, content.texts)
     if not any(table.channels and table.channels[0].values.size >= LEAST_ROWS for table in tables):
         remedy = "write times and angles as arrays by name, or as a list of records"
         raise TunnelError("no arrays of numbers", where=where, remedy=remedy)
-    return [part for table in tables for part in _labelled(_in_stated_unit(table, found), found)]
+    return [part for table in tables for part in _labelled(_in_stated_unit(table, content), content)]
 
 
-def _visit(value: Any, path: str, found: _Found) -> None:
+def _visit(value: Any, path: str, content: _Found) -> None:
     """Find arrays, numbers and texts in a value of the document."""
     if isinstance(value, dict):
         if (indexed := _indexed(value)) is not None:
-            _visit(indexed, path, found)
+            _visit(indexed, path, content)
             return
-        _visit_members(value, path, found)
+        _visit_members(value, path, content)
     elif isinstance(value, list):
-        _visit_list(value, path, found)
+        _visit_list(value, path, content)
     elif isinstance(value, str):
         group, _, name = path.rpartition("/")
         if name.lower() in _UNITS:
-            found.stated[group] = known_unit(value) or ""
+            content.stated[group] = known_unit(value) or ""
         elif name in RUN_IDS:
-            found.runs[group] = value
+            content.runs[group] = value
         elif name == "drive_hold":
-            found.arrays[path] = np.array(hold_order(value))
+            content.arrays[path] = np.array(hold_order(value))
         else:  # such as "12 m/s"
             numbers = facts_in([f"{name}: {value}"])
             for heading, number in numbers.items():
-                found.arrays["/".join(filter(None, (group, heading.replace("/", "∕"))))] = np.array(number)
+                content.arrays["/".join(filter(None, (group, heading.replace("/", "∕"))))] = np.array(number)
             if not numbers and value.strip() and name:
-                found.texts[path] = value
+                content.texts[path] = value
     elif isinstance(value, int | float):
-        found.arrays[path or "value"] = np.array(float(value))
+        content.arrays[path or "value"] = np.array(float(value))
 
 
-def _visit_members(value: Mapping[str, Any], path: str, found: _Found) -> None:
-    units = next((one for key, one in value.items() if key.lower() in _UNITS and isinstance(one, dict)), {})
-    names = next((one for key, one in value.items() if key.lower() in _NAMES and _are_texts(one)), None)
-    arrays = [key for key, one in value.items() if isinstance(one, list) and _are_numbers(one)]
+def _visit_members(value: Mapping[str, Any], path: str, content: _Found) -> None:
+    units = next(
+        (entry for key, entry in value.items() if key.lower() in _UNITS and isinstance(entry, dict)), {}
+    )
+    names = next((entry for key, entry in value.items() if key.lower() in _NAMES and _are_texts(entry)), None)
+    arrays = [key for key, entry in value.items() if isinstance(entry, list) and _are_numbers(entry)]
     for key, member in value.items():
         below = f"{path}/{key}" if path else key
         if member is units or member is names:
             continue
         matrix = isinstance(member, list) and member and all(isinstance(row, list) for row in member)
         if names is not None and matrix and all(len(row) == len(names) for row in member):
-            _visit_list([dict(zip(names, row, strict=True)) for row in member], below, found)
-        elif isinstance(value.get("name"), str) and arrays == [key]:  # a channel that describes itself
+            _visit_list([dict(zip(names, row, strict=True)) for row in member], below, content)
+        elif isinstance(value.get("name"), str) and arrays == [key]:  # a channel with its own description
             group = path.rpartition("/")[0]
             own = f"{group}/{value['name']}" if group else value["name"]
-            _visit(member, own, found)
-            texts = {k.lower(): one for k, one in value.items() if isinstance(one, str)}
+            _visit(member, own, content)
+            texts = {k.lower(): entry for k, entry in value.items() if isinstance(entry, str)}
             own_unit = next((texts[k] for k in _UNITS if k in texts), "")
-            found.units[own] = known_unit(own_unit) or own_unit
+            content.units[own] = known_unit(own_unit) or own_unit
         else:
-            _visit(member, below, found)
+            _visit(member, below, content)
             if isinstance(unit := units.get(key), str):
-                found.units[below] = known_unit(unit) or unit
+                content.units[below] = known_unit(unit) or unit
 
 
-def _visit_list(value: Sequence[Any], path: str, found: _Found) -> None:
+def _visit_list(value: Sequence[Any], path: str, content: _Found) -> None:
     if _are_numbers(value):
         if len(value) > 1:
-            found.arrays[path or "column"] = _numbers(value)
+            content.arrays[path or "column"] = _numbers(value)
     elif value and all(
         isinstance(row, list) and _are_numbers(row) and len(row) == len(value[0]) for row in value
     ):
-        found.arrays[path or "column"] = np.stack([_numbers(row) for row in value])
+        content.arrays[path or "column"] = np.stack([_numbers(row) for row in value])
     elif value and all(isinstance(row, dict) and _is_flat(row) for row in value):
-        _visit_records(value, path, found)
+        _visit_records(value, path, content)
     else:
-        # Members of the group above: channels that describe themselves, or a group for each run.
+        # members of the group above: channels with their own descriptions, or a group for each run
         for i, member in enumerate(value, 1):
-            _visit(member, f"{path}[{i}]" if not _describes_itself(member) else f"{path}/{i}", found)
+            _visit(member, f"{path}[{i}]" if not _describes_itself(member) else f"{path}/{i}", content)
 
 
-def _visit_records(rows: Sequence[Mapping[str, Any]], path: str, found: _Found) -> None:
-    """Records of the same members: a column for each member."""
+def _visit_records(rows: Sequence[Mapping[str, Any]], path: str, content: _Found) -> None:
+    """Records with equal members: a column for each member."""
     names = list(dict.fromkeys(name for row in rows for name in row))
     series = []
     for name in names:
@@ -146,15 +148,15 @@ def _visit_records(rows: Sequence[Mapping[str, Any]], path: str, found: _Found) 
     (table,) = tables_of(pl.DataFrame(series), layout, ".", None, Table((), remarks=("",)))
     for channel in table.channels:
         own = f"{path}/{channel.name}" if path else channel.name
-        found.arrays[own] = channel.values
-        found.units[own] = channel.unit
-    for one in series:
-        if names_runs(one.name) and one.dtype == pl.String:
-            found.labels[path] = one.name, one
+        content.arrays[own] = channel.values
+        content.units[own] = channel.unit
+    for column in series:
+        if names_runs(column.name) and column.dtype == pl.String:
+            content.labels[path] = column.name, column
 
 
 def _in_stated_unit(table: Table, found: _Found) -> Table:
-    """A table whose one reading without a unit has the unit stated by its group, or the document."""
+    """A table with one reading without a unit; it takes the unit stated by its group, or the document."""
     unit = found.stated.get(table.part) or found.stated.get("", "")
     bare = [c for c in table.channels if not c.unit and not names_a_time(c.name) and not names_runs(c.name)]
     if kind_of(unit) in ("", "time") or len(bare) != 1:

@@ -1,4 +1,4 @@
-"""LabVIEW measurement files (LVM): text in segments, whose headers state the units and clocks of the columns."""
+"""LabVIEW measurement files (LVM): text in segments with headers that state the units and clocks of the columns."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ _KEYS = (
 )  # fmt: skip
 """Keys of the format; others are the user's own."""
 _X, _COMMENT = "X_Value", "Comment"
-_NEAR = 0.1  # of a step: the next segment of one record begins one step after the last sample
-_RIGHT = 1e-3  # of a step: a stated one is rounded
+_NEAR = 0.1  # share of a step: the next segment of a record begins one step after the last sample
+_RIGHT = 1e-3  # share of a step: a stated step is rounded
 _SINCE_1904 = 1e9  # s: a greater X0 is counted from 1904
 
 
 @dataclass(frozen=True)
 class _Header:
-    """The statements of a header, by key: the cells after it, each above its column of numbers."""
+    """The statements of a header, by key: the cells after the key, each above its column of numbers."""
 
     cells: Mapping[str, Sequence[str]]
     lines: Sequence[str]
@@ -56,14 +56,14 @@ class _Header:
         return cells[column - 1].strip() if 0 < column <= len(cells) else ""
 
     def number(self, key: str, column: int) -> float:
-        """A number that the header states of a column; NaN where it states none."""
+        """A number that the header states for a column; NaN if it states none."""
         try:
             return float(self.text(key, column).replace(",", "."))
         except ValueError:
             return float("nan")
 
     def since(self, column: int) -> int | None:
-        """The start of a column, ns since 1970; None where it is not stated."""
+        """The start of a column, ns since 1970; None if it is not stated."""
         date = re.fullmatch(r"(\d{4})/(\d{1,2})/(\d{1,2})", self.text("Date", column))
         time = re.fullmatch(r"(\d{1,2}):(\d{2}):(\d{2})(?:[.,](\d+))?", self.text("Time", column))
         if date is None or time is None:
@@ -186,7 +186,7 @@ def _is_time(header: _Header) -> bool:
 def _by_clocks(
     channels: Sequence[Channel], labels: Mapping[int, int], header: _Header, kind: str
 ) -> list[Table]:
-    """One table where all readings share the columns of times; else one for each stated clock."""
+    """One table if all readings share the columns of times; else one for each stated clock."""
     readings = [channel for channel in channels if channel.place - 1 in labels]
     clocks = [channel for channel in channels if channel.place - 1 not in labels and channel.name != _COMMENT]
     waves = []
@@ -223,7 +223,7 @@ def _by_clocks(
 def _agree(
     clocks: Sequence[Channel], channel: Channel, wave: Waveform, first: Waveform, of_first: Channel
 ) -> bool:
-    """Whether the rows of a reading are at the times that the header states of it, by the first column of times."""
+    """Whether the rows of a reading are at its times according to the header, by the first column of times."""
     if len(clocks) > 1:
         own = [clock for clock in clocks if clock.place < channel.place][-1]
         known = np.isfinite(channel.values)
@@ -239,7 +239,7 @@ def _agree(
 
 
 def _joined(before: Sequence[Table], after: Sequence[Table]) -> list[Table]:
-    """Two segments of one record, whose times go on, as one; empty where they are two records."""
+    """Two segments of one record with consecutive times, joined; empty if they are two records."""
     if len(before) != 1 or len(after) != 1:
         return []
     first, second = before[0], after[0]

@@ -47,7 +47,7 @@ def _read(content: bytes, where: str) -> list[Table]:
 
 
 def _text(stated: Any) -> str:
-    """A name or a comment in one line; empty where it is XML."""
+    """A name or a comment in one line; empty if it is XML."""
     text = str(stated or "").strip()
     return "" if text.startswith("<") else one_line(text, 40)
 
@@ -56,7 +56,7 @@ def _columns(file: Any, number: int, name: str, clock: int, where: str) -> Stamp
     """The numeric channels of a group in physical units, on the times of its master channel; one sample is a fact.
 
     Args:
-        name: of the group.
+        name: name of the group.
         clock: index of the master channel.
     """
     group = file.groups[number]

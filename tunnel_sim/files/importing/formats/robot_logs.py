@@ -35,17 +35,18 @@ _NAMES = ("name", "names", "joint_names", "dof_names")
 """Fields that name the joints of the arrays beside them."""
 _TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
 _PLAIN = "std_msgs/msg/"
-_OTHER_CLOCK = 1.0  # s between header and log: one clock is simulated, or not set
+_OTHER_CLOCK = 1.0  # s between header and log stamps: beyond it one clock is simulated, or not set
 _ZSTD = b"\x28\xb5\x2f\xfd"
 _CDR = ("cdr", "")
 _REMEDY = "record it again, or recover it by `mcap recover` or `ros2 bag reindex`"
 
 
 class _Topic:
-    """The messages of a topic that were read so far.
+    """The messages of a topic read so far.
 
     Args:
-        definition: of its type as text, and the language of the text; empty: the type is one of ROS itself.
+        definition: definition of its type as text, and the language of the text; empty: the type is one of ROS
+            itself.
     """
 
     def __init__(self, name: str, type: str, definition: str = "", language: str = "") -> None:
@@ -53,9 +54,9 @@ class _Topic:
         self.log_ns: list[int] = []
         self.header_ns: list[int] = []
         self.columns: dict[str, tuple[str, list[int], list[float]]] = {}
-        """By name: the unit, the places of the messages that have a number, and the numbers."""
+        """By name: the unit, the indices of the messages with a number, and the numbers."""
         self.skipped = ""
-        """Why its messages are not read; empty: they are."""
+        """Why the topic's messages are not read; empty: they are read."""
 
 
 def _read_mcap(content: bytes, where: str) -> list[Table]:
@@ -131,7 +132,7 @@ def _tables(
     """The tables of some messages, each with its topic and its log stamp in ns.
 
     Args:
-        topics: all, once the messages have been read.
+        topics: all topics, once the messages have been read.
     """
     decoders: dict[str, Any] = {}
     for number, (topic, log_ns, raw) in enumerate(messages):
@@ -213,7 +214,7 @@ def _numbers(
 
     Args:
         above: the fields that contain the message.
-        plain: whether it is a number without a meaning of its own, which may be whole, such as std_msgs/Int32.
+        plain: whether it is a number without a specific meaning, which may be whole, such as std_msgs/Int32.
     """
     for key, value in vars(message).items():
         if key.startswith("__") or key in ("header", "layout", *_NAMES) or key.endswith("covariance"):
@@ -236,7 +237,7 @@ def _numbers(
 
 
 def _clocks(topics: Sequence[_Topic]) -> list[StampedColumns]:
-    """The columns of topics with their stamps: of the header, or else of the log."""
+    """The columns of topics with their stamps: from the header, or else from the log."""
     logs = [np.array(topic.log_ns, dtype=np.int64) for topic in topics]
     headers = [np.array(topic.header_ns, dtype=np.int64) for topic in topics]
     headed = [bool((header != 0).all()) for header in headers]
@@ -255,7 +256,7 @@ def _clocks(topics: Sequence[_Topic]) -> list[StampedColumns]:
         for name, (_, at, values) in topic.columns.items():
             rows[name] = np.full(stamps.size, np.nan)
             rows[name][at] = values
-        # A quotient is the nearest number to the decimal fraction, as the same time in a text is.
+        # a quotient is the nearest number to the decimal fraction, like the same time in a text
         time_s, rows, repeated = in_order((stamps - origin) / 1e9, rows)
         remarks = [_of_stamps(topic, delay, own, mixed=mixed, several=len(topics) > 1)]
         if repeated:
@@ -271,8 +272,8 @@ def _of_stamps(topic: _Topic, delay: np.ndarray, headed: bool, *, mixed: bool, s
     """The remark on the stamps of a topic.
 
     Args:
-        delay: of its log stamps after its header stamps, s.
-        mixed: whether header stamps are not used, because they are of another clock than the log stamps of a topic.
+        delay: delay of its log stamps after its header stamps, s.
+        mixed: whether header stamps are ignored because their clock differs from a topic's log stamps.
         several: whether other topics are aligned with it.
     """
     usual, least, most = (1e3 * float(of(delay)) for of in (np.median, np.min, np.max))

@@ -1,7 +1,7 @@
-"""Columns whose samples have stamps of several clocks, as topics of a robot and channel groups of a measurement.
+"""Columns with samples stamped by several clocks, such as topics of a robot or channel groups of a measurement.
 
-Each clock has a table. The columns of the other clocks are put onto its stamps: a demand is held until the next one
-comes, as a controller does, and a measured quantity is interpolated.
+Each clock has a table. The columns of the other clocks are put onto its stamps: a demand is held until the next
+demand, as a controller does, and a measured quantity is interpolated.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from tunnel_sim.files.importing.tables import LEAST_ROWS, Channel, Table
 from tunnel_sim.vocabulary.errors import counted, one_line
 from tunnel_sim.vocabulary.quantities import Rows, Times
 
-_SAME = 0.01  # of a step: a shift this small does not change a phase
+_SAME = 0.01  # share of a step: a shift this small does not change a phase
 _DEMAND = re.compile(
     r"(?i)command|cmd|goal|target|set[ _]?point|soll|desired|demand|(?<![a-z])(ref|reference|des|sp)(?![a-z])"
 )
-"""In the name of a column or its clock: a controller follows it."""
+"""Words in the name of a column or its clock that denote a demand on a controller."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,9 +29,9 @@ class StampedColumns:
     """Columns with the same stamps.
 
     Args:
-        name: of the clock in messages: a topic, or a channel group.
-        time_s: stamps from an origin that all clocks share, in their order, each once.
-        remarks: on the stamps.
+        name: name of the clock in messages: a topic, or a channel group.
+        time_s: stamps from an origin common to all clocks, in their order, each once.
+        remarks: remarks on the stamps.
         facts: single numbers beside the columns, by name.
     """
 
@@ -43,7 +43,7 @@ class StampedColumns:
 
     @property
     def quoted(self) -> str:
-        """Its name in a message."""
+        """The clock's name in a message."""
         return f"'{one_line(self.name, 40)}'"
 
     @property
@@ -65,7 +65,7 @@ def stamped_tables(clocks: Sequence[StampedColumns], kind: str, where: str) -> l
     """A table for each clock, with the columns of all clocks on its stamps; the first column has its times.
 
     Args:
-        kind: of file, for the note.
+        kind: kind of file, for the note.
     """
     merged: list[StampedColumns] = []
     for clock in _with_own_names([clock for clock in clocks if clock.channels and clock.time_s.size]):
@@ -76,7 +76,7 @@ def stamped_tables(clocks: Sequence[StampedColumns], kind: str, where: str) -> l
             first = merged[same]
             channels, remarks = (*first.channels, *clock.channels), (*first.remarks, *clock.remarks)
             merged[same] = replace(first, channels=channels, remarks=remarks)
-    # The few stamps of a command are not a record.
+    # the few stamps of a command are not a record
     long = [clock for clock in merged if clock.time_s.size >= LEAST_ROWS] or merged
     check_size(sum(clock.time_s.size for clock in long) * sum(len(clock.channels) for clock in merged), where)
     facts = {name: value for clock in clocks for name, value in clock.facts.items()}
@@ -84,7 +84,7 @@ def stamped_tables(clocks: Sequence[StampedColumns], kind: str, where: str) -> l
 
 
 def _with_own_names(clocks: Sequence[StampedColumns]) -> list[StampedColumns]:
-    """The clocks with the name of the clock before the name of a column that several have."""
+    """The clocks, with the clock's name prefixed to the name of a column that several clocks have."""
     names = [channel.name for clock in clocks for channel in clock.channels]
     return [
         replace(
@@ -141,12 +141,12 @@ def _held(clock: StampedColumns, other: StampedColumns, column: Rows) -> Rows:
     """The last value before or at each stamp of a clock; NaN before the first."""
     good = np.isfinite(column)
     values = np.append(np.nan, column[good])
-    # A stamp that two clocks share is rounded differently by each.
+    # each clock rounds a common stamp differently
     return values[np.searchsorted(other.time_s[good], clock.time_s + _SAME * clock.step, side="right")]
 
 
 def _interpolated(clock: StampedColumns, other: StampedColumns, column: Rows) -> Rows:
-    """The values on straight lines between stamps; NaN before the first and after the last one."""
+    """The values on straight lines between stamps; NaN before the first stamp and after the last."""
     good = np.isfinite(column)
     if not good.any():
         return np.full(clock.time_s.size, np.nan)
@@ -154,7 +154,7 @@ def _interpolated(clock: StampedColumns, other: StampedColumns, column: Rows) ->
 
 
 def _aligned(clock: StampedColumns, other: StampedColumns, stamps: Times, *, held: bool) -> str:
-    """The remark on a column put onto some stamps of a clock: by how much the stamps differ."""
+    """The remark on a column put onto some stamps of a clock: how much the stamps differ."""
     after = np.searchsorted(other.time_s, stamps, side="right")
     age = stamps - other.time_s[after - 1]
     ahead = np.append(other.time_s, np.inf)[after] - stamps

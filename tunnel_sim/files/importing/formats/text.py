@@ -32,7 +32,7 @@ _FACT = re.compile(
     r"(?:([^\s\d:=,;\t|][^:=,;\t|]{0,14}?)\s*[;,\t]\s*)?([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)"
     r"(?!\d|[.:/-]\d) *([;,\t]? *[^\s\d;,\t|=:][^;,\t|=:]*(?![^;,\t|]))?"
 )
-"""A name, perhaps a cell with its unit, a number, and its unit, perhaps in the next cell; no date or time."""
+"""A name, perhaps a cell with its unit, a number, and its unit, perhaps in the next cell; not a date or time."""
 _HERTZ = {"hz": 1.0, "khz": 1e3, "mhz": 1e6}
 _SI = {kind: next(unit for unit, factor in units.items() if factor == 1.0) for kind, units in UNITS.items()}
 _AXIS = re.compile(r"(?i)\W*(horizontal|vertical) units?\s*[,:;=\t]\s*(.+)$")
@@ -76,7 +76,7 @@ def facts_in(lines: Sequence[str]) -> dict[str, float]:
     """Numbers stated in lines, such as ``Sample rate: 1000 Hz`` or ``V = 54 km/h``, by name and unit.
 
     Returns:
-        Values in SI units where the unit is known; the name then ends with it in brackets.
+        Values in SI units if the unit is known; the name then ends with it in brackets.
     """
     facts = {}
     for line in (line.replace('"', "") for line in lines if len(line) <= _LONG_LINE):
@@ -148,7 +148,7 @@ def _units_row(
 ) -> tuple[list[str], dict[str, float]]:
     """The units in the last of the rows that may name columns, and numbers there; it is removed if it states them.
 
-    Known units or others in brackets, or more known ones than short texts; numbers stand below their names.
+    Known units, or others in brackets; or more known units than short texts. Numbers stand below their names.
     """
     units = [""] * width
     stated = [cell for cell in above[-1][1] if cell.strip("-")] if len(above) > 1 else []
@@ -183,7 +183,7 @@ def _beside(rows: Sequence[Sequence[str]], numeric: Sequence[int]) -> tuple[tupl
 
 
 def _of_scope(lines: Sequence[str], units: Sequence[str], numeric: Sequence[int]) -> list[str]:
-    """The units of columns; where they have none, as an oscilloscope states them for both axes."""
+    """The units of columns; if they have none, from an oscilloscope's statements for both axes."""
     stated: dict[str, list[str]] = {}
     for line in lines:
         found = _AXIS.match(line.replace('"', ""))
@@ -204,18 +204,18 @@ def _of_scope(lines: Sequence[str], units: Sequence[str], numeric: Sequence[int]
 
 
 def distinct(names: Sequence[str]) -> list[str]:
-    """Names of columns, with the position where a name is ambiguous."""
+    """Names of columns, with the position added to an ambiguous name."""
     counts = Counter(names)
     return [name if counts[name] == 1 else f"{name} #{i + 1}" for i, name in enumerate(names)]
 
 
 TEXT = Reader("a table of text", limits.CSV_BYTES)
-"""Any file without a reader of its own; `read_text_tables` takes what is known of its dialect."""
+"""Any file without a reader of its own; `read_text_tables` takes known properties of its dialect."""
 _CLOCK = r"(?:^|[ T])(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?)(?:\s*([AaPp])\.?[Mm]\.?|Z|[+-]\d{2}:?\d{2})?$"
 _DAY = 86400.0  # s
-_HEAD, _MIDDLE = 2**18, 2**14  # bytes that are inspected
-_LOOKED_AT = 1000  # texts of a column that show whether they are times of day
-_PART = 2**20  # texts that are converted at once
+_HEAD, _MIDDLE = 2**18, 2**14  # number of inspected bytes
+_LOOKED_AT = 1000  # number of texts of a column that show whether they are times of day
+_PART = 2**20  # number of texts converted at once
 _LONG_LINE = 1000  # characters: a longer line above a table does not state a number
 _HEAD_LINES = 400
 _NAMES = {"tab": "\t", ";": ";", ",": ",", "|": "|", "blank": " "}
@@ -278,7 +278,7 @@ def read_text_tables(
         "decimal": dialect.decimal,
     }
     if dialect.delimiter == " ":
-        content = re.sub(rb"[ \t\r]+", b" ", content)  # first, so that no run of blanks is scanned twice
+        content = re.sub(rb"[ \t\r]+", b" ", content)  # first, so that a run of blanks is not scanned twice
         content = re.sub(rb"(?m)^ | $", b"", content)
     text_at = {i for i in range(dialect.width) if _holds_texts(sample, i, dialect.decimal)} - {layout.runs}
     labels = None
@@ -310,11 +310,11 @@ def frame_of(
     at: int | None,
     where: str,
 ) -> pl.DataFrame:
-    """The columns of a table of text, from its first row of numbers on: numbers, or texts where one is found.
+    """The columns of a table of text, from its first row of numbers on: numbers, or texts in columns with a text.
 
     Args:
         texts: indices of the columns of texts.
-        at: index of the only column to read, as texts as they are; None: all columns.
+        at: index of the only column to read, as unchanged texts; None: all columns.
     """
     options: dict[str, Any] = {
         "separator": dialect.delimiter,
@@ -334,7 +334,7 @@ def frame_of(
             numbers["quote_char"] = None
         try:
             return pl.read_csv(content, schema=kinds, null_values=missing, **numbers)
-        except pl.exceptions.ComputeError:  # a text somewhere: cell by cell
+        except pl.exceptions.ComputeError:  # the column contains a text: cell by cell
             return pl.read_csv(content, schema=all_texts, null_values=missing, **options)
     except pl.exceptions.PolarsError as error:
         what = f"not a table of text ({one_line(error, 60)})"
@@ -342,7 +342,7 @@ def frame_of(
 
 
 def _cells(line: str, dialect: Dialect) -> list[str]:
-    """The cells of a line of the head, whose names may have other delimiters than the numbers below."""
+    """The cells of a line of the head; its names may have other delimiters than the numbers below."""
     own = dialect.split(line)
     if len(own) != 1 or dialect.width < 2:
         return own
@@ -359,7 +359,7 @@ def _holds_texts(rows: Sequence[Sequence[str]], column: int, decimal: str) -> bo
 
 
 def find_dialect(body: Sequence[str], choices: ImportChoices) -> Dialect | None:
-    """The dialect in which most cells of some lines are numbers; of several, the one with most columns."""
+    """The dialect in which most cells of some lines are numbers; of several, the dialect with most columns."""
     delimiters = _NAMES.values() if choices.delimiter is None else (_NAMES[choices.delimiter],)
     decimals = (".", ",") if choices.decimal is None else (choices.decimal,)
     best, score = None, (0.2, 0)
@@ -449,14 +449,14 @@ def _seconds(column: pl.Series) -> pl.Series:
     text = column.str.strip_chars(' \t\r"')
     parts = (text.str.extract(_CLOCK, group).str.replace(",", ".") for group in (1, 2, 3))
     hours, minutes, rest = (part.cast(pl.Float64) for part in parts)
-    half = text.str.extract(_CLOCK, 4).str.to_lowercase()  # the twelfth hour is the first of its half
+    half = text.str.extract(_CLOCK, 4).str.to_lowercase()  # the twelfth hour is the first of its half day
     hours = pl.select(pl.when(half.is_null()).then(hours).otherwise(hours % 12.0)).to_series()
     hours += (half == "p").fill_null(value=False).cast(pl.Float64) * 12.0
     return 3600.0 * hours + 60.0 * minutes + rest
 
 
 def read_cells(path: Path) -> tuple[list[str], list[list[str]]]:
-    """A small table of texts, such as one of conditions: its names, and the cells of every further line."""
+    """A small table of texts, such as a table of conditions: its names, and the cells of every further line."""
     where = shown(path)
     content, _ = as_utf8(read_regular(path, limits.DOCUMENT_BYTES), where)
     lines = [line for line in content.decode(errors="replace").splitlines() if line.strip()]

@@ -1,7 +1,7 @@
-"""Columns with clocks of their own, as in TDMS and LabVIEW files: aligned by the times that the file states.
+"""Columns with their own clocks, as in TDMS and LabVIEW files: aligned by the times that the file states.
 
-Samples that coincide are put in one row. Nothing is interpolated: a column whose samples do not coincide with those
-of another one is no column of its table.
+Samples that coincide are put in one row. Nothing is interpolated: a column is not in the table of another
+column unless their samples coincide.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import counted, one_line
 from tunnel_sim.vocabulary.quantities import Rows, Seconds
 
-_SAME = 0.01  # of a step: stamps are rounded, and a shift this small does not change a phase
-_FOLLOWS = 0.01  # of its standard deviation: how far the samples between may lie from a straight line
+_SAME = 0.01  # share of a step: stamps are rounded, and a shift this small does not change a phase
+_FOLLOWS = 0.01  # share of its standard deviation: maximum distance of samples from a straight line
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,9 +26,9 @@ class Waveform:
     """A column with its clock.
 
     Args:
-        step: s; 0 where none is stated.
-        offset: of its first sample from the start, s.
-        since: the start, ns since 1970; None where none is stated.
+        step: step, s; 0 if none is stated.
+        offset: offset of its first sample from the start, s.
+        since: the start, ns since 1970; None if none is stated.
         facts: numbers that are stated beside it.
         texts: texts that are stated beside it.
     """
@@ -60,8 +60,8 @@ def aligned_tables(waves: Sequence[Waveform], kind: str, step_fact: str) -> list
     """A table for each clock of some waveforms, with the columns that can be aligned with it.
 
     Args:
-        kind: of file, and the place in it, for the note.
-        step_fact: the name of the number that states the step of a table.
+        kind: kind of file, and the place in it, for the note.
+        step_fact: name of the number that states the step of a table.
     """
     clocks: list[list[Waveform]] = []
     for wave in sorted(waves, key=lambda one: not one.timed):
@@ -89,7 +89,7 @@ def _table(
             remarks.append(f"'{name}' is sampled more often: its samples at the times of the table are used")
     facts: dict[str, float] = {}
     texts: dict[str, str] = {}
-    for wave in sorted(waves, key=lambda one: one in clock):  # waves of the clock count
+    for wave in sorted(waves, key=lambda one: one in clock):  # the waveforms of the clock take precedence
         facts |= wave.facts
         texts |= wave.texts
     if first.timed:
@@ -108,7 +108,7 @@ def _table(
 
 
 def _one_clock(first: Waveform, second: Waveform) -> bool:
-    """Whether two waveforms have the same times; without a step, any other of the same length may share them."""
+    """Whether two waveforms have the same times; without a step, any waveform of the same length may share them."""
     if first.size != second.size:
         return False
     if not second.timed:
@@ -147,7 +147,7 @@ def _on_clock(clock: Waveform, wave: Waveform) -> Rows | str:
 
 
 def _follows(values: Rows, at: NDArray[np.intp]) -> bool:
-    """Whether straight lines between some samples lead through all samples between them."""
+    """Whether straight lines between some samples pass through all samples between them."""
     between = values[at[0] : at[-1] + 1]
     good = np.isfinite(between)
     if not good.any() or at.size < 2:

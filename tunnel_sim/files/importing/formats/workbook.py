@@ -15,8 +15,8 @@ from tunnel_sim.files.reading import check_count
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, counted, library
 
-_NAMED = 3  # sheets that a remark lists
-_HEAD = 400  # rows of a sheet that are inspected
+_NAMED = 3  # number of sheets that a remark lists
+_HEAD = 400  # number of inspected rows of a sheet
 _TEXTS = (
     "run",
     "drive_hold",
@@ -45,12 +45,12 @@ class _Sheet:
 
     @property
     def is_record(self) -> bool:
-        """Whether it has as many rows of numbers as a record."""
+        """Whether the sheet has as many rows of numbers as a record."""
         return self.layout is not None and len(self.rows) - self.layout.first >= LEAST_ROWS
 
 
 def _read(content: bytes, where: str) -> list[Table]:
-    """The tables of a workbook, one for each sheet, or one for each run of it."""
+    """The tables of a workbook, one for each sheet, or one for each run in it."""
     fastexcel = library("fastexcel", "Excel", "import", where)
     with faults("an Excel workbook", where):
         _check_archive(content, where)
@@ -87,7 +87,7 @@ def _read(content: bytes, where: str) -> list[Table]:
 
 
 def _of_sheets(names: Sequence[str], sheet: _Sheet) -> str:
-    """A remark on the layout that some sheets share."""
+    """A remark on the layout of several sheets."""
     more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
     listed = ", ".join(f"'{name}'" for name in names[:_NAMED])
     return f"workbook: sheet{'s' if len(names) > 1 else ''} {listed}{more}, {sheet.described}"
@@ -117,7 +117,7 @@ def _sheet(book: Any, name: str, where: str) -> _Sheet:
 
 
 def _tables(book: Any, sheet: _Sheet, said: str) -> list[Table]:
-    """The tables of a sheet of numbers, whose parts name their runs; none if it has no numbers."""
+    """The tables of a sheet of numbers; their parts name their runs. None if the sheet has no numbers."""
     layout = sheet.layout
     if layout is None:
         return []
@@ -130,10 +130,10 @@ def _tables(book: Any, sheet: _Sheet, said: str) -> list[Table]:
 
 
 def _described(book: Any, sheet: _Sheet, names: set[str]) -> dict[str, dict[str, Any]]:
-    """Statements of a sheet on others, or on their runs, by the name in each row; empty: none.
+    """Statements of a sheet about other sheets, or about their runs, by the name in each row; empty: none.
 
     Args:
-        names: of the sheets and runs with records, in lower case.
+        names: names of the sheets and runs with records, in lower case.
     """
     for column in range(sheet.width):
         cells = [_same(row[column]) for row in sheet.rows]
@@ -160,7 +160,7 @@ def _described(book: Any, sheet: _Sheet, names: set[str]) -> dict[str, dict[str,
 
 
 def _one_row(sheet: _Sheet) -> dict[str, float]:
-    """The numbers of a sheet that has one row of them below their names."""
+    """The numbers of a sheet with one row of numbers below their names."""
     layout = sheet.layout
     if layout is None or not layout.headed or len(sheet.rows) - layout.first != 1:
         return {}
@@ -179,7 +179,7 @@ def _with(
     covers: Mapping[str, float],
     several: bool,
 ) -> Table:
-    """A table with the statements of other sheets on it, under its name there."""
+    """A table with the statements that other sheets make about it, by its name there."""
     stated = described.get(_same(table.part)) or described.get(_same(sheet.name)) or {}
     facts: dict[str, float] = {}
     run = ""
