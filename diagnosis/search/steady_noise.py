@@ -10,7 +10,7 @@ from scipy.special import chdtri
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import residual_spectra
-from diagnosis.search.process_noise import ProcessNoise, likeliest, random_moments
+from diagnosis.search.process_noise import ProcessNoise, acts_by, likeliest, random_moments
 from diagnosis.search.random_spectra import MomentSource
 from diagnosis.settings import RandomMomentSettings
 
@@ -40,7 +40,7 @@ _LINE_WIDTHS = 3.0  # about the centre of a spectrum in which a line is sought
 def is_steady_noise(result: ProcessNoise, chosen: RandomMomentSettings) -> bool:
     """Whether innovations are white and steady, without bursts, and not of one run alone, and do not fade."""
     first, *_, last = result.intensities
-    if first > FADING * last and result.unsteady_drop > chosen.acts_from:
+    if first > FADING * last and acts_by(result.unsteady_drop, chosen):
         return False
     return (
         departure_from_white(result) <= WHITE_INNOVATIONS
