@@ -72,15 +72,20 @@ class InertiaBySpring(Rival):
     ) -> list[Hypothesis]:
         """The inertias with the other effects of each answer, where they explain more than every set of effects.
 
+        Runs that differ by chance are compared as if they repeated exactly.
+
         None with one spring, and none where effects alone explain the readings down to their noise. The law is
         exact, so it must leave no more than chance: beside runs that differ, it would take up a part of that.
         """
         data = nominal.problem.data
         if len(data.springs) < 2 or data.driven:
             return []
-        repeating = [fit for fit in (nominal, *(one.fit for one in known)) if not fit.problem.scatter]
+        sets = [one for one in (Hypothesis((), nominal), *known) if not one.fit.problem.scatter]
+        repeating = [one.fit for one in sets] + [
+            fitted for one in likely if (fitted := try_fit(*without_deviations(one.fit))) is not None
+        ]
         least = min(repeating, key=lambda fit: fit.total, default=None)
-        if least is not None and least.total - least.count < chdtri(len(least.problem.names), INERTIAS_RATE):
+        if least is None or least.total - least.count < chdtri(len(least.problem.names), INERTIAS_RATE):
             return []
         bases: dict[tuple[str, ...], Hypothesis] = {(): Hypothesis((), nominal)}
         for answer in likely:
@@ -93,7 +98,7 @@ class InertiaBySpring(Rival):
             if (one := _with_inertias(base)) is not None
         ]
         exact = [one for one in tried if one.leaves_within(np.zeros(len(CHANNELS)))]
-        better = [one for one in exact if least is None or _explains_more(one.fit, least.total)]
+        better = [one for one in exact if _explains_more(one.fit, least.total)]
         return [
             one
             for one in better
