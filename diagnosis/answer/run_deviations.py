@@ -154,10 +154,15 @@ class RunDeviations:
 
     @classmethod
     def of(cls, fitted: Fit) -> RunDeviations | None:
-        """The runs of a fit; None if none of their quantities may scatter, or a sensitivity is not finite."""
+        """The runs of a fit, if their quantities may scatter.
+
+        Returns:
+            None where none may, where a run has no damping or no stiffness to compare, or where a sensitivity is
+            not finite.
+        """
         own = {one.name: one for one in fitted.problem.scatter}
         able = may_scatter(ALL_EFFECTS, fitted.problem.data)
-        if not able:
+        if not able or not np.all(fitted.linear[:, 1:] != 0.0):
             return None
         scatter = tuple(own.get(kind.name, usual(fitted, kind)) for kind in able)
         problem, point = with_deviations(*without_deviations(fitted), scatter)

@@ -93,7 +93,7 @@ class RunRepeatability:
             fitted: the fit of the answer.
 
         Returns:
-            None for a single run, for a body without a spring, and where the model's sensitivities are not
+            None for a single run, for a body without a spring or a damping, and where the sensitivities are not
             finite.
         """
         found = RunDeviations.of(fitted)

@@ -12,6 +12,8 @@ from diagnosis.findings.cautions import CAUTIONS, sentence_of
 from diagnosis.findings.judgements import zeros_apart
 from diagnosis.findings.repeatability import RunRepeatability
 from diagnosis.findings.units import own_repeatability
+from diagnosis.likelihood.least_squares import fit_at
+from diagnosis.model.parameters import Point
 from diagnosis.model.similarity import Similarity
 from diagnosis.search.scatter import evident, scattered
 from tests.support.gap_campaigns import campaign, nominal, studied
@@ -151,3 +153,12 @@ def test_few_noisy_runs_say_nothing_about_scatter() -> None:
 
 def test_where_scatter_is_found_no_limit_is_stated() -> None:
     assert found(np.random.default_rng(3).normal(0.0, 0.006, len(CONDITIONS))).limits is None
+
+
+def test_runs_without_damping_have_no_relative_deviation_of_it() -> None:
+    base = nominal(campaign(duration=6.0))
+    common = base.point.common.copy()
+    common[base.problem.names.index("mechanical_damping")] = 0.0
+    point = Point(common, base.point.per_run)
+    assert RunRepeatability.find(fit_at(base.problem, point)) is None
+    assert RunRepeatability.find(base) is not None
