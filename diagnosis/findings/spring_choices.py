@@ -82,3 +82,16 @@ def two_springs_words(found: Mapping[str, Any]) -> str:
         f"Two springs that are not as stiff as stated would explain the gap{beside}: for example, "
         f"{springs}. Measure their stiffness again."
     )
+
+
+def inertia_by_spring_words(found: Mapping[str, Any]) -> str:
+    """An inertia that differs from spring to spring and would explain the gap."""
+    beside = f" beside {plain(*found['beside'])}" if found["beside"] else ""
+    each = [
+        f"{for_people(100.0 * one.error, 100.0 * one.std, '%')} with the spring of {one.stiffness:g} N m/rad"
+        for one in (SpringError(**given) for given in found["springs"])
+    ]
+    return (
+        f"An inertia that differs from spring to spring would explain the gap{beside}: {listed(each)}, against the "
+        "softest spring. Weigh the adapters and clamps of the springs."
+    )

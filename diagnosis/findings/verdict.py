@@ -12,7 +12,7 @@ from diagnosis.findings.other_motions import second_mode_words
 from diagnosis.findings.patch import model_words
 from diagnosis.findings.place import runs_of_the_gap
 from diagnosis.findings.second_inertia import second_inertia_words
-from diagnosis.findings.spring_choices import choice_words, two_springs_words
+from diagnosis.findings.spring_choices import choice_words, inertia_by_spring_words, two_springs_words
 from diagnosis.findings.terms import (
     BETWEEN_RUNS,
     CHANNELS,
@@ -171,6 +171,7 @@ def _with_second_modes(said_first: str, answer: Findings) -> list[str]:
 
 RIVALS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
     "two springs off": two_springs_words,
+    "inertia by spring": inertia_by_spring_words,
     "second inertia": second_inertia_words,
     "stated": lambda found: str(found["words"]),
 }

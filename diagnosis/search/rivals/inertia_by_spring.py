@@ -9,7 +9,7 @@ nonlinear spring, tell the two apart.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from typing import Final
 
@@ -18,14 +18,13 @@ from scipy.special import chdtri
 
 from diagnosis.likelihood.least_squares import Fit, try_fit
 from diagnosis.likelihood.residuals import CHANNELS
-from diagnosis.model.fact import Fact, as_stated
+from diagnosis.model.fact import Fact
 from diagnosis.model.parameters import Point
 from diagnosis.model.similarity import Similarity
 from diagnosis.search.hypothesis import Hypothesis, restricted
 from diagnosis.search.rivals.rival import Rival
-from diagnosis.search.rivals.two_springs import ONE_SPRING, differs_by_spring
+from diagnosis.search.rivals.two_springs import ONE_SPRING, SpringError, differs_by_spring
 from diagnosis.search.scatter import without_deviations
-from identification.show.numbers import for_people, listed, plain
 from tunnel_sim.effects.base import SPRING_TOLERANCE, Drawn
 from tunnel_sim.physics.run_settings import SettingsTable
 
@@ -109,20 +108,19 @@ class InertiaBySpring(Rival):
 
     def fact(self, best: Hypothesis, similarity: Similarity) -> Fact:
         """The differences of the inertia by spring, and the effects that act with them."""
-        fit, data = best.fit, best.fit.problem.data
-        inflate = 100.0 * float(np.sqrt(1.0 + max(fit.excess, 0.0)))
-        each = []
-        for number, spring in enumerate(data.springs[1:]):
-            name = f"{_kind(number).name}.error"
-            size = for_people(100.0 * fit.value(name), inflate * fit.std(name), "%")
-            each.append(f"{size} with the spring of {similarity.own(spring, 'N m/rad'):g} N m/rad")
-        own = {_kind(number).name for number in range(len(data.springs) - 1)}
-        others = [name for name in best.names if name not in own]
-        beside = f" beside {plain(*others)}" if others else ""
-        return as_stated(
-            f"An inertia that differs from spring to spring would explain the gap{beside}: "
-            f"{listed(each)}, against the softest. Weigh the adapters and clamps of the springs."
-        )
+        fit, springs = best.fit, best.fit.problem.data.springs
+        inflate = float(np.sqrt(1.0 + max(fit.excess, 0.0)))
+        own = [_kind(number).name for number in range(len(springs) - 1)]
+        each = [
+            SpringError(
+                similarity.own(spring, "N m/rad"),
+                fit.value(f"{name}.error"),
+                inflate * fit.std(f"{name}.error"),
+            )
+            for spring, name in zip(springs[1:], own, strict=True)
+        ]
+        beside = [name for name in best.names if name not in own]
+        return Fact("inertia by spring", {"springs": [asdict(one) for one in each], "beside": beside})
 
 
 def _with_inertias(base: Hypothesis) -> Hypothesis | None:

@@ -15,8 +15,9 @@ RIVAL_EXPLAINS: Final = 0.8
 """Minimum share of a gap that an explanation outside the vocabulary must explain to be mentioned.
 Judgement."""
 
-RIVAL_NEAR: Final = 2.0
-"""Maximum χ² of a rival over the least of all rivals, for it to be mentioned beside that one. Judgement."""
+RIVAL_NEAR: Final = 20.0
+"""Maximum χ² of a rival above the best rival's, in the dispersion of the misfit, for it to be mentioned as well.
+Judgement. Two parameters lower χ² by more than 20 by chance once in 22,000."""
 
 
 class Rival:
@@ -70,12 +71,12 @@ class FoundRival:
 
 def rival_facts(found: Sequence[FoundRival], nominal: Fit, similarity: Similarity) -> list[Fact]:
     """The facts of the rivals that explain most of the gap, and nearly as much as the best of them."""
-    least = min((one.best.fit.total for one in found), default=0.0)
+    best = min((one.best.fit for one in found), key=lambda fit: fit.total, default=nominal)
     explains = [
         one
         for one in found
         if one.best.fit.excess <= (1.0 - RIVAL_EXPLAINS) * nominal.excess
-        and one.best.fit.total <= RIVAL_NEAR * least
+        and one.best.fit.total - best.total <= RIVAL_NEAR * (1.0 + max(best.excess, 0.0))
     ]
     facts = (one.rival.fact(one.best, similarity) for one in explains)
     return [fact for fact in facts if fact is not None]
