@@ -193,7 +193,7 @@ class _Candidate:
 
     Args:
         nominal: the fit in white noise.
-        source: the fit whose residuals show the colour.
+        source: the fit with residuals that show the colour.
         fit: the nominal one in noise of that colour.
         noise: of that colour.
     """

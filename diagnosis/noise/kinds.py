@@ -23,9 +23,9 @@ class Noise:
     """A campaign's noise, white unless the kind says otherwise.
 
     Args:
-        variance: of one sample, quantisation included, rad², by run id: the one used by the diagnosis.
-        stated_variance: of one sample, stated by the campaign, rad²; None where it is not stated.
-        reason: for this kind.
+        variance: variance of one sample as the diagnosis uses it, quantisation included, rad², by run id.
+        stated_variance: variance of one sample stated by the campaign, rad²; None where it is not stated.
+        reason: reason for this kind of noise.
         estimated: the records' own variance, mean over the runs, rad².
         relative: standard deviation of that estimate, a share of it.
         measured: variance of one sample from the spectrum above the motion, rad², by run id.

@@ -51,9 +51,9 @@ class Hum:
     """A hum that was found.
 
     Args:
-        frequency: of the mains, Hz.
-        amplitude: of its strongest line, rad, root mean square over the runs that show it.
-        std: of the amplitude, rad.
+        frequency: frequency of the mains, Hz.
+        amplitude: amplitude of its strongest line, rad, root mean square over the runs that show it.
+        std: standard deviation of the amplitude, rad.
         frequency_std: standard deviation of the frequency, Hz; None where the amplitude is not above the noise.
         excess: its contribution to the mean squared residual over the noise variance, a ratio.
         harmonic: the multiple of the frequency at which the strongest line is.
@@ -92,7 +92,7 @@ def _is_hum(line: MainsLine, chosen: ReadOffSettings, *, known: bool) -> bool:
     counts where the ranges cover much of the spectrum.
 
     Args:
-        known: whether the mains are stated.
+        known: whether the frequency of the mains is stated.
     """
     folded = line.harmonic > 1 and line.folds > 0 and not known
     if (folded or line.covered > chosen.hum_covered) and line.beside >= chosen.hum_run_rate:
@@ -111,7 +111,7 @@ def refine_frequency(campaign: Campaign, frequency: float, motion: float = REFER
     """The frequency at which a sine and its harmonics remove most power from all records, Hz.
 
     Args:
-        frequency: of the mains, Hz, to within a quarter of a line's width.
+        frequency: frequency of the mains, Hz, to within a quarter of a line's width.
         motion: frequency of the fastest motion, Hz; a line is sought beyond its harmonics.
     """
     shown = _showing(campaign, frequency, motion)
@@ -144,8 +144,8 @@ def remove_hum(
     """Remove a hum and its harmonics from every record, where the record separates them from the motion.
 
     Args:
-        frequency: of the fundamental, Hz, visible in one record or more.
-        variance: of the noise of one sample, rad².
+        frequency: frequency of the fundamental, Hz, visible in one record or more.
+        variance: variance of the noise of one sample, rad².
         motion: frequency of the fastest motion, Hz; a line is removed beyond its harmonics.
 
     Returns:

@@ -40,8 +40,8 @@ def repeated(
 
     Args:
         white: standard deviation of a sample's noise before rounding, rad, by run id.
-        step: of the lattice, rad; 0 where there is none.
-        count: of the repetitions.
+        step: step of the lattice, rad; 0 where there is none.
+        count: number of repetitions.
         levels: readings that occur where steps are of unequal width, increasing, shape (levels,), rad; None: all
             steps are equal.
 
@@ -77,14 +77,14 @@ class Rounding:
         return Rounded([run.means(reading - motion) for run, motion, reading in again])
 
     def residuals(self, data: Data) -> list[list[Array]]:
-        """White residuals of data due to noise and rounding alone, by repetition and by run."""
+        """White residuals that noise and rounding alone cause, by repetition and by run."""
         del data
         return []
 
     def expected(self, fit: Fit) -> tuple[Array, Array]:
         """Mean power of the residuals of a fit by `TESTS`, and its scatter, shape (tests,) each.
 
-        Both are shares of the power of white noise of the fit's variance; the scatter is that beyond white noise.
+        Both are shares of the power of white noise with the fit's variance; the scatter excludes white noise's own.
         """
         del fit
         return np.ones(len(TESTS)), np.zeros(len(TESTS))
@@ -99,7 +99,7 @@ class Rounded(Rounding):
     """A rounding error that is not white.
 
     Args:
-        errors: due to noise and rounding, by run, repetitions of it, shape (repetitions, blocks), rad.
+        errors: errors by noise and rounding, by run, shape (repetitions, blocks), rad.
     """
 
     errors: Sequence[Array]

@@ -56,16 +56,16 @@ class ProcessNoise:
     """A fitted random moment.
 
     Args:
-        spectrum: as fitted, of one part or two.
+        spectrum: the fitted spectrum, of one part or two.
         runs: ids of the runs in which it acts.
-        drops: of −2 ln L against white measurement noise alone, by such run, shape (runs,), dimensionless.
+        drops: drop of −2 ln L against white measurement noise alone, by such run, shape (runs,), dimensionless.
         by_run: the drop of each such run over the predicted power of its response, in noise variances, shape
             (runs,), dimensionless; at least 0.
         cost: −2 ln L without constants, of all runs, dimensionless.
         excess: mean squared scaled innovation minus one, dimensionless.
-        innovations: scaled, by run in which it acts.
-        interval: between innovations, s.
-        intensities: likeliest intensity in each third of the runs over the fitted one, shape (3,), dimensionless.
+        innovations: scaled innovations, by run in which it acts.
+        interval: time between innovations, s.
+        intensities: most likely intensity in each third of the runs over the fitted one, shape (3,), dimensionless.
         unsteady_drop: further drop of −2 ln L with these intensities, dimensionless.
     """
 
@@ -179,7 +179,7 @@ def acts_by(drop: float, chosen: RandomMomentSettings) -> bool:
     """Whether a drop of −2 ln L shows a random moment.
 
     Args:
-        drop: of −2 ln L, dimensionless.
+        drop: drop of −2 ln L, dimensionless.
     """
     return drop > chosen.acts_from
 
@@ -196,7 +196,7 @@ def _fit(
     known: ProcessNoise | None = None,
     price: float = 0.0,
 ) -> ProcessNoise | None:
-    """The likeliest spectrum of these parts.
+    """The most likely spectrum of these parts.
 
     Args:
         known: the fit without the last part; the fit starts there.
@@ -266,7 +266,7 @@ def _fitted(channels: Sequence[_Channel], spectrum: Spectrum, cost: float) -> Pr
 
 
 def _by_third(channels: Sequence[_Channel], spectrum: Spectrum) -> tuple[Array, float]:
-    """The likeliest intensity in each third of the runs, over the fitted one, and the drop of −2 ln L by them."""
+    """The most likely intensity in each third of the runs, over the fitted one, and the drop of −2 ln L by them."""
     costs = np.zeros((_UNSTEADY.size, 3))
     for row, factor in zip(costs, np.exp(_UNSTEADY).tolist(), strict=True):
         other = tuple(replace(part, intensity=factor * part.intensity) for part in spectrum)
@@ -388,7 +388,7 @@ def with_response(fit: Fit, spectrum: Spectrum) -> Data | None:
     """The runs of a fit, with the response to a random moment added to their noise.
 
     Args:
-        spectrum: of the moment.
+        spectrum: spectrum of the moment.
 
     Returns:
         The data, scaled as the innovations of the steady filter; None where it acts in no run, or the filter does

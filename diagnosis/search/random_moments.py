@@ -65,16 +65,16 @@ def weigh_random_moments(view: RunsInView, hypotheses: Sequence[Hypothesis]) -> 
     """Try turbulence, vortices with a wandering phase, and the surroundings, under all sets of effects.
 
     Args:
-        view: in which they are fitted.
-        hypotheses: found without a random moment.
+        view: view of the runs in which sets are fitted.
+        hypotheses: sets found without a random moment.
 
     Returns:
-        The likeliest random moment with the best set of effects, and others that explain the runs nearly as well:
-        runs at one wind speed do not separate the stream from the surroundings, nor vortices, whose frequency
-        follows the wind, from turbulence about a fixed frequency. It must lower −2 ln L
-        beside the same set by more than chance, and be steady noise, alike in all runs in which it acts. Empty
-        where none qualifies, where the likeliest may not be named, where no random moment could explain enough of
-        the gap, and where one law explains nearly all of the residual.
+        The most likely random moment with the best set of effects, and others that explain the runs nearly as well.
+        Runs at one wind speed separate neither the stream from the surroundings, nor vortices, which follow the
+        wind, from turbulence about a fixed frequency. The moment must lower −2 ln L beside the same set by more
+        than chance, and be steady noise, alike in all runs in which it acts. Empty where none qualifies, where the
+        most likely one may not be named, where no random moment could explain enough of the gap, and where one law
+        explains nearly all of the residual.
     """
     scale = Scale.of(hypotheses, view.gap, view.base.settings.weighing)
     best = max([Hypothesis((), view.base), *hypotheses], key=scale.weight)
@@ -96,10 +96,10 @@ class _Beside:
     """A random moment of a source, and the best set of effects beside it.
 
     Args:
-        alike: the likeliest, and other kinds that explain the runs nearly as well.
+        alike: the most likely moment, and other kinds that explain the runs nearly as well.
         sets: the set with the response to the random moment in the noise, and its rivals with another effect in
             place of one.
-        seen: the first of them with the sensor's noise alone.
+        seen: the first of these sets with the sensor's noise alone.
     """
 
     alike: tuple[ProcessNoise, ...]
@@ -190,7 +190,7 @@ def _kind(process: ProcessNoise) -> frozenset[str]:
 
 
 def _explained(source: MomentSource, beside: Hypothesis) -> tuple[float, ProcessNoise | None]:
-    """The likeliest random moment of a source in a set's residual, and its cost; infinite where none acts."""
+    """The most likely random moment of a source in a set's residual, and its cost; infinite where none acts."""
     process = likeliest(random_moments(beside.fit, source), beside.fit.settings.moment)
     return (np.inf, None) if process is None else (_cost(process, beside), process)
 
@@ -273,7 +273,7 @@ def _is_random(process: ProcessNoise, source: MomentSource, fitted: Fit) -> bool
 def _shown_apart(
     process: ProcessNoise, source: MomentSource, fitted: Fit, kinds: Sequence[type[Effect]]
 ) -> bool:
-    """Whether the runs in which no other source acts show a random moment too; true where there are none.
+    """Whether the runs without another source show the random moment too; true if every run has another source.
 
     They must show it beside a spring and a damping of their own: a run that differs is no random motion.
 
@@ -363,7 +363,7 @@ def _closed_by_a_law(fitted: Fit, kinds: Sequence[str], share: float) -> bool:
 
 
 def _exchanges(sets: Sequence[Hypothesis]) -> set[tuple[str, str]]:
-    """An effect of the first set and the one in its place in another that explains the runs nearly as well."""
+    """Pairs of an effect of the first set and the effect that replaces it in a set nearly as good."""
     first, *others = sets
     near = (one for one in others if one.fit.total < first.fit.total + ALIKE_WITHIN)
     apart = ((set(first.effects) - set(one.effects), set(one.effects) - set(first.effects)) for one in near)
@@ -373,10 +373,10 @@ def _exchanges(sets: Sequence[Hypothesis]) -> set[tuple[str, str]]:
 def _exchanged(
     top: Hypothesis, exchanges: Collection[tuple[str, str]], kinds: Sequence[type[Effect]]
 ) -> list[Hypothesis]:
-    """The sets with another effect in place of one, in the noise of the given set.
+    """The sets with one effect exchanged for another, in the noise of the given set.
 
     Args:
-        exchanges: names of an effect and of the one to take its place; exchanges that do not apply are passed over.
+        exchanges: pairs of names: an effect and its replacement; pairs that do not apply are passed over.
     """
     found = []
     for out, into in sorted(exchanges):
@@ -441,7 +441,7 @@ def _in_noise_of(base: Fit, known: Hypothesis) -> list[Hypothesis]:
 
 
 def _sought_again(hypothesis: Hypothesis) -> Hypothesis:
-    """The set with instants and phases sought once more; each run keeps the ones of least residual.
+    """The set after a second search for instants and phases; each run keeps those with the smaller residual.
 
     They were first found before the other effects were known.
     """

@@ -38,7 +38,7 @@ _LINE_WIDTHS = 3.0  # about the centre of a spectrum in which a line is sought
 
 
 def is_steady_noise(result: ProcessNoise, chosen: RandomMomentSettings) -> bool:
-    """Whether innovations are white and steady, without bursts, and not of one run alone, and do not fade."""
+    """Whether innovations are white, steady and without bursts, in more than one run, and do not fade."""
     first, *_, last = result.intensities
     if first > FADING * last and acts_by(result.unsteady_drop, chosen):
         return False
@@ -87,7 +87,7 @@ def bursts(result: ProcessNoise, false_alarm_rate: float) -> float:
 
 
 def of_all_runs(result: ProcessNoise) -> float:
-    """P-value that one run has as much of a random moment as this one does, if it acts in all runs.
+    """P-value of the strongest run's share of a random moment, if the moment acts in all runs.
 
     A gust in one run is not turbulence. The power of the response to the narrowest random moment, which has two
     quadratures, is an exponential variable; the power of a broader one varies less. Fisher's test of the greatest
@@ -108,8 +108,8 @@ def is_a_line(fit: Fit, process: ProcessNoise) -> bool:
     response is narrow, and the release of every run absorbs a steady part at its frequency.
 
     Args:
-        fit: by least squares in the sensor's noise; the release has absorbed its part.
-        process: the likeliest random moment in its residual.
+        fit: fit by least squares in the sensor's noise; the release has absorbed its part of the moment.
+        process: the most likely random moment in its residual.
     """
     runs = fit.problem.data.runs
     spectra = [one for run, one in zip(runs, residual_spectra(fit), strict=True) if run.id in process.runs]
@@ -126,14 +126,14 @@ def is_a_line(fit: Fit, process: ProcessNoise) -> bool:
 
 
 def is_slow(fit: Fit, process: ProcessNoise, source: MomentSource) -> bool:
-    """Whether slow changes of the reading explain what a random moment does: a zero of the run, or its drift.
+    """Whether a zero of each run, or its drift, explains as much as the random moment.
 
     A random moment moves the rig most near its resonance. A zero that differs from run to run has the spectrum of a
     moment that lasts longer than the run.
 
     Args:
         fit: as in `is_a_line`.
-        process: the likeliest random moment of the source in its residual.
+        process: the most likely random moment of the source in its residual.
     """
     quick = []
     for residual in fit.residuals:
