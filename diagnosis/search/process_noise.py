@@ -29,6 +29,7 @@ from diagnosis.search.random_spectra import (
     Spectrum,
     SpectrumForm,
     SpectrumPart,
+    of_floor,
     of_surroundings,
     wandering,
 )
@@ -151,6 +152,10 @@ def random_moments(fit: Fit, source: MomentSource) -> list[ProcessNoise]:
     stream = (BROAD, CENTRED) if narrow is None else (BROAD, CENTRED, narrow)
     own_forms = stream if source is STREAM else of_surroundings(_unit(channels))
     found = {form: one for form in own_forms if (one := _fit(channels, (form,))) is not None}
+    if source is SURROUNDINGS and own_forms[1] in found:
+        floor = of_floor(found[own_forms[1]].spectrum[0], _unit(channels))
+        if (shaken := _fit(channels, (floor,))) is not None:
+            found[floor] = shaken
     first = likeliest(found.values(), chosen)
     if first is None:
         return list(found.values())
@@ -467,7 +472,7 @@ def _filters(channels: Sequence[_Channel], spectra: Sequence[Spectrum]) -> list[
 def _discrete(channels: Sequence[_Channel], spectra: Sequence[Spectrum]) -> tuple[Array, Array]:
     """Transition and disturbance over one interval, shape (runs, n, n) each; all spectra are of the same form.
 
-    States: angle, rate, and of each part the moment; about a centre, its quadrature too.
+    States: angle, rate, and the states of each part.
     """
     size = 2 + sum(part.states for part in spectra[0])
     dynamics = np.zeros((len(channels), size, size))
@@ -476,14 +481,12 @@ def _discrete(channels: Sequence[_Channel], spectra: Sequence[Spectrum]) -> tupl
         own[:2, :2] = channel.oscillator
         first = 2
         for part in spectrum:
-            places = range(first, first + part.states)
-            corner = 2.0 * np.pi * part.bandwidth
-            own[1, first] = channel.acceleration(part)
-            own[places, places] = -corner
-            if part.states == 2:
-                turn = 2.0 * np.pi * (part.centre + part.strouhal_number * channel.reduced)
-                own[first, first + 1], own[first + 1, first] = -turn, turn
-            noise[places, places] = 2.0 * corner * part.intensity**2
+            places = slice(first, first + part.states)
+            driven = [1, *range(first, first + part.states)]
+            own[places, places], own[1, places], white = part.dynamics(
+                channel.acceleration(part), channel.reduced
+            )
+            noise[np.ix_(driven, driven)] += white
             first += part.states
     interval = np.array([channel.interval for channel in channels])
     transition, disturbance = discretised(dynamics, drive, interval)

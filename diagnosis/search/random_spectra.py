@@ -19,6 +19,7 @@ from diagnosis.model.run_data import RunData
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.capabilities import AtRandom
 from tunnel_sim.effects.traits import Condition
+from tunnel_sim.vocabulary.record import Array
 
 LONGEST_BANDWIDTH = 20.0  # Hz: the rig cannot distinguish a broader spectrum from a white one
 _LEAST_STROUHAL = 0.05  # bluff bodies shed at 0.1 to 0.3
@@ -119,6 +120,24 @@ class SpectrumPart:
         """Number of states of the process: the moment, and about a centre its quadrature."""
         return 2 if self.centre > 0.0 or self.strouhal_number > 0.0 else 1
 
+    def dynamics(self, acceleration: float, reduced: float) -> tuple[Array, Array, Array]:
+        """The linear dynamics of the part's states, driven by white noise.
+
+        Args:
+            acceleration: acceleration of the body per unit intensity, rad/s².
+            reduced: wind speed over the body's width, Hz.
+
+        Returns:
+            The dynamics of the states, shape (states, states), 1/s; the acceleration of the body by each, shape
+            (states,); and the spectral intensity of the noise on the body's rate and on the states, shape
+            (1 + states, 1 + states), in SI units squared per s.
+        """
+        corner = 2.0 * np.pi * self.bandwidth
+        turn = 2.0 * np.pi * (self.centre + self.strouhal_number * reduced)
+        states = np.array([[-corner, -turn], [turn, -corner]])[: self.states, : self.states]
+        on_body = np.array([acceleration, 0.0])[: self.states]
+        return states, on_body, np.diag([0.0, *[2.0 * corner * self.intensity**2] * self.states])
+
     @property
     def band(self) -> Literal["broad_band", "narrow_band"]:
         """Whether it is broad or wandering vortices, as `tunnel_sim.effects.Effect.random` has it."""
@@ -135,6 +154,24 @@ class SpectrumPart:
             kind.random,
             kind.condition,
         )
+
+
+@dataclass(frozen=True)
+class FloorPart(SpectrumPart):
+    """The inertial moment of a floor that resonates under a white force.
+
+    The acceleration of the floor is small below its resonance and white above it. Half-width and frequency of the
+    resonance are bandwidth and centre; the intensity is the standard deviation of the moment in the resonance.
+    """
+
+    def dynamics(self, acceleration: float, reduced: float) -> tuple[Array, Array, Array]:
+        """Place and speed of the floor; its acceleration moves the body, directly by the force too."""
+        del reduced
+        omega, damping = 2.0 * np.pi * self.centre, 4.0 * np.pi * self.bandwidth
+        motion = np.array([-(omega**2), -damping])
+        shaken = np.array([acceleration, 0.0, 1.0])
+        force = 2.0 * damping * self.intensity**2 / omega**2
+        return np.array([[0.0, 1.0], motion]), acceleration * motion, force * np.outer(shaken, shaken)
 
 
 #: The parts of a random moment's spectrum, whose moments are independent of each other.
@@ -208,3 +245,21 @@ def of_surroundings(unit: float) -> tuple[SpectrumForm, SpectrumForm]:
         SURROUNDINGS,
     )
     return broad, centred
+
+
+def of_floor(centred: SpectrumPart, unit: float) -> SpectrumForm:
+    """A moment of a floor, which is sought near a moment about a frequency.
+
+    Args:
+        unit: as in `of_surroundings`.
+    """
+    bounds = ((unit / _FARTHEST, unit * _FARTHEST), (0.01, LONGEST_BANDWIDTH), CENTRED.bounds[2])
+    s, b, f = centred.parameters
+    near = np.array([(s * size, b * width, f) for size in (0.5, 1.0, 2.0) for width in (0.5, 1.0, 2.0)])
+    return SpectrumForm(
+        lambda s, b, f: FloorPart(s, b, f, source=SURROUNDINGS),
+        np.clip(near, *np.transpose(bounds)).tolist(),
+        bounds,
+        (0.3, 0.3, 0.03),
+        SURROUNDINGS,
+    )

@@ -15,7 +15,7 @@ from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import investigate
 from diagnosis.search.process_noise import MomentLayer, is_of_reading, likeliest, random_moments
 from diagnosis.search.random_moments import obeys_a_law, weigh_random_moments
-from diagnosis.search.random_spectra import STREAM, SURROUNDINGS
+from diagnosis.search.random_spectra import STREAM, SURROUNDINGS, FloorPart, SpectrumPart
 from diagnosis.search.scatter import differing
 from diagnosis.search.steady_noise import is_a_line, is_slow, is_steady_noise
 from diagnosis.settings import Settings
@@ -55,9 +55,13 @@ def shaken(
     moment: float = 0.0,
     coefficient: float = 0.0,
     centre: float = 0.0,
+    floor: float = 0.0,
     seed: int = 5,
 ) -> Campaign:
     """Every run under a random moment of first order about a centre, in N m or in proportion to the pressure.
+
+    With a damping ratio of a floor, the moment is in proportion to the acceleration of a floor that resonates at
+    the centre under a white force, and its resonance has that size.
 
     The nominal model is linear, so that the response is added, at eight steps a sample.
     """
@@ -73,6 +77,11 @@ def shaken(
         pole = np.exp(2.0 * np.pi * (1j * centre - bandwidth) * step)
         white = rng.standard_normal(time.size) + 1j * rng.standard_normal(time.size)
         given = std * np.real(lfilter([np.sqrt(1.0 - abs(pole) ** 2)], [1.0, -pole], white))
+        if floor:  # poles of the floor's motion, and its acceleration from the positions around a sample
+            pole = np.exp(2.0 * np.pi * centre * step * (-floor + 1j * np.sqrt(1.0 - floor**2)))
+            motion = lfilter([1.0], np.real(np.poly([pole, np.conj(pole)])), white.real)
+            quiet = (2.0 * np.pi * centre) ** 2 * motion
+            given = std * np.diff(motion, 2, prepend=[0.0, 0.0]) / step**2 / np.std(quiet)
         angle = response(given, step, INERTIA, damping, stiffness)[::8]
         runs.append(replace(run, record=Record(run.record.time_s, run.record.yaw_rad + angle)))
     return replace(data, runs=tuple(runs))
@@ -102,6 +111,23 @@ def test_a_moment_that_acts_with_the_wind_off_as_well_is_ambient_vibration() -> 
     # at the rig only the level of the spectrum around resonance is seen well
     assert part.intensity**2 / part.bandwidth == pytest.approx(0.02**2 / BANDWIDTH, rel=0.3)
     assert len(layer(answer).process.runs) == len(CONDITIONS)
+
+
+def test_a_floor_that_resonates_is_ambient_vibration() -> None:
+    """Its spectrum rises with the fourth power below the resonance, and is level above it."""
+    base = nominal(shaken(of(STILL), STILL, moment=0.05, centre=5.0, floor=0.05))
+    by_form = {
+        type(one.spectrum[0]): one for one in random_moments(base, SURROUNDINGS) if len(one.spectrum) == 1
+    }
+    floor, about = by_form[FloorPart], by_form[SpectrumPart]
+    (part,) = floor.spectrum
+    assert part.centre == pytest.approx(5.0, rel=0.02)
+    assert part.bandwidth == pytest.approx(0.05 * 5.0, rel=0.35)  # about a hundred correlation times
+    assert part.intensity == pytest.approx(0.05, rel=0.2)
+    assert is_steady_noise(floor, Settings().moment)
+    assert floor.cost < about.cost - 100.0
+    (answer,) = weigh_random_moments(whole_runs(base, ALL_RANDOM), [])
+    assert answer.names == ("ambient_vibration",)
 
 
 @pytest.mark.slow
