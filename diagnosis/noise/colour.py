@@ -17,7 +17,7 @@ from typing import Final
 
 import numpy as np
 from scipy.optimize import minimize
-from scipy.special import chdtri
+from scipy.special import chdtri, fdtrc
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import resonance
@@ -38,6 +38,8 @@ follow the motion. Judgement. The power of noise that follows the motion then di
 COLOUR_BANDS: Final = 0.75
 """Minimum share of stationary bands where only the wind-off runs show the colour. Judgement. Few parts are
 compared in that case, so non-stationary bands are easily missed."""
+FADES_RATE: Final = 0.01
+"""Rate at which chance alone makes noise that resonates seem to fade with the motion. Convention."""
 COLOUR_SLOPE_STDS: Final = 2.0
 """Margin by which the slope assumed below the lowest band exceeds the estimated slope, in standard
 deviations. Convention."""
@@ -187,16 +189,26 @@ def whitened(data: Data, colour: Colour) -> Data:
 
 
 _LOWEST_CORNER = 1e-3  # of the colour's lowest frequency: effectively none
+_THIRDS, _ABOUT = (
+    3,
+    3.0,
+)  # parts of a run, and the factor about the motion's frequency, in which noise may fade
 _WHITE = 30.0  # the level's natural logarithm stays within this distance of white noise
 
 
-def zero_wanders(nominal: Fit, colour: Colour) -> bool:
+def zero_wanders(nominal: Fit, white: Fit, colour: Colour) -> bool:
     """Whether the noise's spectrum rises to the lowest frequencies of the runs without a corner.
 
     The decision is a likelihood ratio. The spectrum adds white noise and a first-order process, which is a
     random walk where its corner is zero; the colour's lowest band is the lowest visible corner of stationary noise.
-    Noise that resonates is stationary too, although its flank is steep. The spectrum is fitted to the ordinates
-    between the harmonics by Whittle's likelihood (P. Whittle, Ark. Mat. 2 (1953) 423, doi 10.1007/BF02590998).
+    Noise that resonates is stationary too, although its flank is steep, unless it fades with the motion. The
+    spectrum is fitted to the ordinates between the harmonics by Whittle's likelihood (P. Whittle, Ark. Mat. 2
+    (1953) 423, doi 10.1007/BF02590998).
+
+    Args:
+        nominal: fit in white noise.
+        white: fit in noise of the colour.
+        colour: colour of the noise.
     """
     spectra = []
     for index, (run, residual) in enumerate(zip(nominal.problem.data.runs, nominal.residuals, strict=True)):
@@ -205,9 +217,30 @@ def zero_wanders(nominal: Fit, colour: Colour) -> bool:
         spectra.append((whole.frequency[whole.between], whole.power[whole.between]))
     frequency, power = (np.concatenate(column) for column in zip(*spectra, strict=True))
     relative = frequency / colour.frequency[0]
-    steady = min(process.least_loss(relative, power) for process in _STEADY)
-    free = min(steady, _WANDERING.least_loss(relative, power))
-    return bool(2.0 * (steady - free) / HANN > chdtri(1, 2.0 * nominal.settings.noise.wandering_rate))
+    free, chance = (
+        _WANDERING.least_loss(relative, power),
+        chdtri(1, 2.0 * nominal.settings.noise.wandering_rate),
+    )
+
+    def loses(process: _Process) -> bool:
+        return bool(2.0 * (process.least_loss(relative, power) - free) / HANN > chance)
+
+    return loses(_LEVEL) and (loses(_RESONANT) or fades(white))
+
+
+def fades(white: Fit) -> bool:
+    """Whether whitened residuals about the motion are stronger in the first third of the runs than in the last."""
+    power, count = np.zeros(_THIRDS), np.zeros(_THIRDS)
+    for index, (run, residual) in enumerate(zip(white.problem.data.runs, white.residuals, strict=True)):
+        own = resonance(white, index)
+        for third, part in enumerate(np.array_split(residual, _THIRDS)):
+            window = np.hanning(part.size)
+            about = np.abs(np.log(np.fft.rfftfreq(part.size, run.interval)[1:] / own)) < np.log(_ABOUT)
+            ordinates = np.abs(np.fft.rfft(part * window)[1:][about]) ** 2 / float(window @ window)
+            power[third] += float(np.sum(ordinates))
+            count[third] += ordinates.size
+    first, *_, last = power / np.maximum(count, 1.0)
+    return bool(fdtrc(2.0 * count[0] / HANN, 2.0 * count[-1] / HANN, first / last) < FADES_RATE)
 
 
 def alike_in_all_runs(fit: Fit) -> bool:
@@ -292,8 +325,6 @@ class _Process:
         return min(float(minimize(loss, start, jac=True, bounds=bounds).fun) for start in starts)
 
 
-_STEADY = (
-    _Process(_first_order, 1.0, (1.0, 4.0, 16.0)),
-    _Process(_second_order, 1.0, (2.0, 4.0, 8.0, 16.0), ((0.003, 0.7),)),
-)
+_LEVEL = _Process(_first_order, 1.0, (1.0, 4.0, 16.0))
+_RESONANT = _Process(_second_order, 1.0, (2.0, 4.0, 8.0, 16.0), ((0.003, 0.7),))
 _WANDERING = _Process(_first_order, _LOWEST_CORNER, (_LOWEST_CORNER, 1.0, 4.0, 16.0))

@@ -227,7 +227,7 @@ class _Candidate:
             excessive = test.tests.get("noise level", 1.0) < _misbehaves(test.tests, chosen.gap)
             return still and not excessive and noise_colour(self.source, beyond=COLOUR_BEYOND) is not None
         repeats = alike_in_all_runs(self.nominal) or _rings(self.fit)
-        return not repeats and not zero_wanders(self.nominal, self.noise.spectrum)
+        return not repeats and not zero_wanders(self.nominal, self.fit, self.noise.spectrum)
 
 
 def _candidates(nominal: Fit, noise: Noise) -> Iterator[_Candidate]:

@@ -12,7 +12,7 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.model.fact import Fact
 from diagnosis.noise import gap
 from diagnosis.noise.bands import p_values
-from diagnosis.noise.colour import alike_in_all_runs, noise_colour, zero_wanders
+from diagnosis.noise.colour import FADES_RATE, alike_in_all_runs, fades, noise_colour, zero_wanders
 from diagnosis.noise.gap import noise_noted
 from diagnosis.noise.sensor_noise import NoiseTrend, campaign_noise, noise_trend, reading_step
 from diagnosis.settings import Settings
@@ -104,8 +104,13 @@ def test_a_zero_that_wanders_is_a_gap_and_no_colour(zero):
 @pytest.mark.parametrize("name", [*COLOURS, NEAR])
 def test_coloured_noise_is_taken_for_a_wandering_zero_no_more_often_than_stated(name):
     trials = 60
-    fits = [nominal(coloured(campaign(seed=seed), name, seed=seed)) for seed in range(trials)]
-    alarms = sum(zero_wanders(before, noise_colour(before)) for before in fits)
+    alarms = 0
+    for seed in range(trials):
+        before = nominal(coloured(campaign(seed=seed), name, seed=seed))
+        found = noise_colour(before)
+        alarms += zero_wanders(
+            before, fit(Problem(gap.whitened(before.problem.data, found)), before.point), found
+        )
     assert alarms <= binom.ppf(1.0 - 1e-4, trials, Settings().noise.wandering_rate)
 
 
@@ -113,6 +118,21 @@ def test_noise_that_resonates_near_the_motion_is_a_colour():
     _, noise, found = judged(coloured(campaign(), NEAR, 3.0))
     assert not found.detected
     assert noise.colour is not None
+
+
+def test_white_noise_fades_as_often_as_stated_and_a_dying_motion_always_does():
+    base, rng, trials = nominal(campaign()), np.random.default_rng(7), 400
+
+    def alarms(last):
+        """How many of the trials fade, with noise of so much less power at the end than at the start."""
+        drawn = [
+            [rng.standard_normal(r.size) * np.linspace(1.0, last, r.size) for r in base.residuals]
+            for _ in range(trials)
+        ]
+        return sum(fades(dataclasses.replace(base, residuals=one)) for one in drawn)
+
+    assert 1 <= alarms(1.0) <= binom.ppf(1.0 - 1e-4, trials, FADES_RATE)
+    assert alarms(0.4) > 0.9 * trials
 
 
 def warming(count, _rng):
