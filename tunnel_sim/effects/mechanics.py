@@ -15,6 +15,7 @@ from tunnel_sim.effects.parameters import Circumstances, Trial, WindOnRun, expon
 from tunnel_sim.effects.traits import Text
 from tunnel_sim.physics.expression import parse
 from tunnel_sim.physics.run_settings import RodTwist, SettingsTable
+from tunnel_sim.vocabulary.quantities import PerRun
 
 _RINGING_STEP = 0.02  # relative: the half-power width of a rod's ringing with a damping of 1 % of critical
 
@@ -287,9 +288,14 @@ class SpringMiscalibration(Effect):
     ) -> None:
         """Correct the stiffness of the spring's runs."""
         del drawn
+        runs.spring_stiffness[:] *= cls.scales(stated, effects)
+
+    @classmethod
+    def scales(cls, stated: SettingsTable, effects: Sequence[Self]) -> PerRun:
+        """True over stated value by run: 1 plus the error with the spring concerned, else 1; shape (runs,)."""
         spring, its = stated.spring_stiffness, cls.column(effects, "spring_stiffness")
         concerned = np.abs(spring - its) <= SPRING_TOLERANCE * np.maximum(np.abs(spring), np.abs(its))
-        runs.spring_stiffness[concerned] *= 1.0 + cls.column(effects, "error")[concerned]
+        return np.where(concerned, 1.0 + cls.column(effects, "error"), 1.0)
 
 
 @dataclass(frozen=True)

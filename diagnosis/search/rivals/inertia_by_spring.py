@@ -14,7 +14,6 @@ from functools import cache
 from typing import Final
 
 import numpy as np
-from scipy.special import chdtri
 
 from diagnosis.likelihood.least_squares import Fit, try_fit
 from diagnosis.likelihood.residuals import CHANNELS
@@ -22,15 +21,12 @@ from diagnosis.model.fact import Fact
 from diagnosis.model.parameters import Point
 from diagnosis.model.similarity import Similarity
 from diagnosis.search.hypothesis import Hypothesis, restricted
-from diagnosis.search.rivals.rival import Rival
+from diagnosis.search.rivals.rival import Rival, explains_all, explains_more
 from diagnosis.search.rivals.two_springs import ONE_SPRING, SpringError, differs_by_spring
 from diagnosis.search.scatter import without_deviations
-from tunnel_sim.effects.base import SPRING_TOLERANCE, Drawn
+from tunnel_sim.effects.base import Drawn
 from tunnel_sim.physics.run_settings import SettingsTable
 
-INERTIAS_RATE: Final = 0.001
-"""Rate at which chance alone makes inertias that differ by spring explain more than every set of effects.
-Convention."""
 INERTIAS_BESIDE: Final = 3
 """Number of sets of effects beside which inertias that differ by spring are tried. Judgement. Time against
 coverage."""
@@ -50,9 +46,7 @@ class InertiaOfSpring(ONE_SPRING):  # type: ignore[valid-type, misc]
     ) -> None:
         """Change the inertia in the spring's runs."""
         del drawn
-        spring, its = stated.spring_stiffness, cls.column(effects, "spring_stiffness")
-        concerned = np.abs(spring - its) <= SPRING_TOLERANCE * np.maximum(np.abs(spring), np.abs(its))
-        runs["yaw_inertia"][concerned] *= 1.0 + cls.column(effects, "error")[concerned]
+        runs["yaw_inertia"][:] *= cls.scales(stated, effects)
 
 
 @cache
@@ -84,7 +78,7 @@ class InertiaBySpring(Rival):
             fitted for one in likely if (fitted := try_fit(*without_deviations(one.fit))) is not None
         ]
         least = min(repeating, key=lambda fit: fit.total, default=None)
-        if least is None or least.total - least.count < chdtri(len(least.problem.names), INERTIAS_RATE):
+        if least is None or explains_all(least):
             return []
         bases: dict[tuple[str, ...], Hypothesis] = {(): Hypothesis((), nominal)}
         for answer in likely:
@@ -97,12 +91,12 @@ class InertiaBySpring(Rival):
             if (one := _with_inertias(base)) is not None
         ]
         exact = [one for one in tried if one.leaves_within(np.zeros(len(CHANNELS)))]
-        better = [one for one in exact if _explains_more(one.fit, least.total)]
+        better = [one for one in exact if explains_more(one.fit, least.total)]
         return [
             one
             for one in better
             if all(
-                _explains_more(one.fit, part.fit.total) for part in better if set(part.names) < set(one.names)
+                explains_more(one.fit, part.fit.total) for part in better if set(part.names) < set(one.names)
             )
         ]
 
@@ -135,9 +129,3 @@ def _with_inertias(base: Hypothesis) -> Hypothesis | None:
     problem = replace(problem, effects=(*problem.effects, *kinds), fixed=(*problem.fixed, *fixed))
     fitted = try_fit(problem, Point(np.append(point.common, np.zeros(len(kinds))), point.per_run))
     return None if fitted is None else Hypothesis((*base.effects, *(kind.name for kind in kinds)), fitted)
-
-
-def _explains_more(fitted: Fit, least: float) -> bool:
-    """Whether a fit lowers χ² below the least of all sets by more than chance, whatever both leave."""
-    drop = (least - fitted.total) / (1.0 + max(fitted.excess, 0.0))
-    return drop > float(chdtri(len(fitted.problem.names), INERTIAS_RATE))

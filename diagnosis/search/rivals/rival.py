@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from scipy.special import chdtri
+
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.model.fact import Fact
 from diagnosis.model.similarity import Similarity
@@ -15,9 +17,22 @@ RIVAL_EXPLAINS: Final = 0.8
 """Minimum share of a gap that an explanation outside the vocabulary must explain to be mentioned.
 Judgement."""
 
+RIVAL_RATE: Final = 1e-3
+"""Rate at which chance alone makes a rival explain more than every set of effects. Convention."""
 RIVAL_NEAR: Final = 20.0
 """Maximum χ² of a rival above the best rival's, in the dispersion of the misfit, for it to be mentioned as well.
 Judgement. Two parameters lower χ² by more than 20 by chance once in 22,000."""
+
+
+def explains_more(fitted: Fit, least: float) -> bool:
+    """Whether a fit lowers χ² below the least of all sets by more than chance, whatever both leave."""
+    drop = (least - fitted.total) / (1.0 + max(fitted.excess, 0.0))
+    return drop > float(chdtri(len(fitted.problem.names), RIVAL_RATE))
+
+
+def explains_all(fitted: Fit) -> bool:
+    """Whether a fit explains the readings so well that a rival would explain no more than chance."""
+    return fitted.total - fitted.count < float(chdtri(len(fitted.problem.names), RIVAL_RATE))
 
 
 class Rival:

@@ -14,7 +14,6 @@ from math import hypot, pi, sqrt
 from typing import ClassVar, Final, Self
 
 import numpy as np
-from scipy.special import chdtri
 
 from diagnosis.likelihood.least_squares import Fit, scaled_residuals, try_fit
 from diagnosis.likelihood.problem import Problem
@@ -24,7 +23,7 @@ from diagnosis.model.parameters import Point
 from diagnosis.model.run_data import RunData
 from diagnosis.model.similarity import Similarity
 from diagnosis.search.hypothesis import Hypothesis, restricted
-from diagnosis.search.rivals.rival import Rival
+from diagnosis.search.rivals.rival import Rival, explains_all, explains_more
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.base import Drawn
 from tunnel_sim.effects.parameters import parameter
@@ -32,8 +31,6 @@ from tunnel_sim.physics.input_moment import InputMoment
 from tunnel_sim.physics.run_settings import RodTwist, SettingsTable
 from tunnel_sim.vocabulary.record import Array
 
-SECOND_INERTIA_RATE: Final = 1e-3
-"""False-alarm rate at which a second inertia explains more than every set of effects by chance. Convention."""
 SECOND_INERTIA_BESIDE: Final = 2
 """Number of sets of effects combined with a second inertia, beside the nominal model. Judgement. Time
 against coverage."""
@@ -146,12 +143,12 @@ class TwoInertias(Rival):
             return []
         fits = [*(one.fit for one in known), nominal]
         least = min(fits, key=lambda fit: fit.total)
-        if least.total - least.count < chdtri(len(least.problem.names), SECOND_INERTIA_RATE):
+        if explains_all(least):
             return []
         sets = sorted((one for one in known if _bearable(one.fit.problem)), key=lambda one: one.fit.total)
         bases = [Hypothesis((), nominal), *(one for one in sets if one.effects)][: 1 + SECOND_INERTIA_BESIDE]
         tried = [one for base in bases for one in _beside(base)]
-        better = [one for one in tried if _explains_more(one.fit, least.total)]
+        better = [one for one in tried if explains_more(one.fit, least.total)]
         return [one for one in better if all(_adds(one, other) for other in better)]
 
     def fact(self, best: Hypothesis, similarity: Similarity) -> Fact | None:
@@ -193,17 +190,11 @@ def _bearable(problem: Problem) -> bool:
     return all(kind.autonomous and not kind.on_spring for kind in problem.effects) and not problem.free_forms
 
 
-def _explains_more(fitted: Fit, least: float) -> bool:
-    """Whether a fit lowers χ² below the least of all sets by more than chance, however large both are."""
-    drop = (least - fitted.total) / (1.0 + max(fitted.excess, 0.0))
-    return drop > float(chdtri(len(fitted.problem.names), SECOND_INERTIA_RATE))
-
-
 def _adds(one: Hypothesis, other: Hypothesis) -> bool:
     """Whether a set has a justified effect more than another: its residual is much smaller, and not by chance."""
     larger = set(one.effects) > set(other.effects)
     much = one.fit.total < PARTNER_LEAVES * other.fit.total
-    return not larger or (much and _explains_more(one.fit, other.fit.total))
+    return not larger or (much and explains_more(one.fit, other.fit.total))
 
 
 def _beside(base: Hypothesis) -> Iterator[Hypothesis]:
