@@ -251,7 +251,11 @@ def _parameters(
                 # above the rig's frequencies a random moment looks white: the runs show only size over square
                 # root of the corner
                 limit = "upper" if part.bandwidth >= _AT_LIMIT * LONGEST_BANDWIDTH else None
-                estimates[severity] = Quantity(intensity, intensity * relative, kind.parameters()[0].unit)
+                size = float(np.hypot(intensity, np.linalg.norm([one.tail for one in parts])))
+                std = float(
+                    np.hypot(intensity * relative, size - intensity)
+                )  # where a tail ends is not shown
+                estimates[severity] = Quantity(size, std, kind.parameters()[0].unit)
                 estimates[place] = Quantity(part.bandwidth, None, "Hz", bound=limit)
     own = own_parameters(estimates, study.campaign, study.similarity, study.model)
     single = len({name.split(".")[0] for name in own}) == 1

@@ -120,6 +120,11 @@ class SpectrumPart:
         """Number of states of the process: the moment, and about a centre its quadrature."""
         return 2 if self.centre > 0.0 or self.strouhal_number > 0.0 else 1
 
+    @property
+    def tail(self) -> float:
+        """Standard deviation of a white part beside the intensity, below `LONGEST_BANDWIDTH`, in its unit."""
+        return 0.0
+
     def dynamics(self, acceleration: float, reduced: float) -> tuple[Array, Array, Array]:
         """The linear dynamics of the part's states, driven by white noise.
 
@@ -164,14 +169,23 @@ class FloorPart(SpectrumPart):
     resonance are bandwidth and centre; the intensity is the standard deviation of the moment in the resonance.
     """
 
+    @property
+    def tail(self) -> float:
+        """Standard deviation of the acceleration above the resonance; the runs do not show where it ends."""
+        return float(np.sqrt(2.0 * LONGEST_BANDWIDTH * self._force))
+
+    @property
+    def _force(self) -> float:
+        """Spectral intensity of the white force, in the intensity's unit squared, s."""
+        return 8.0 * np.pi * self.bandwidth * self.intensity**2 / (2.0 * np.pi * self.centre) ** 2
+
     def dynamics(self, acceleration: float, reduced: float) -> tuple[Array, Array, Array]:
         """Place and speed of the floor; its acceleration moves the body, directly by the force too."""
         del reduced
         omega, damping = 2.0 * np.pi * self.centre, 4.0 * np.pi * self.bandwidth
         motion = np.array([-(omega**2), -damping])
         shaken = np.array([acceleration, 0.0, 1.0])
-        force = 2.0 * damping * self.intensity**2 / omega**2
-        return np.array([[0.0, 1.0], motion]), acceleration * motion, force * np.outer(shaken, shaken)
+        return np.array([[0.0, 1.0], motion]), acceleration * motion, self._force * np.outer(shaken, shaken)
 
 
 #: The parts of a random moment's spectrum, whose moments are independent of each other.

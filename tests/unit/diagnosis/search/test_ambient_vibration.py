@@ -15,7 +15,13 @@ from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import investigate
 from diagnosis.search.process_noise import MomentLayer, is_of_reading, likeliest, random_moments
 from diagnosis.search.random_moments import obeys_a_law, weigh_random_moments
-from diagnosis.search.random_spectra import STREAM, SURROUNDINGS, FloorPart, SpectrumPart
+from diagnosis.search.random_spectra import (
+    LONGEST_BANDWIDTH,
+    STREAM,
+    SURROUNDINGS,
+    FloorPart,
+    SpectrumPart,
+)
 from diagnosis.search.scatter import differing
 from diagnosis.search.steady_noise import is_a_line, is_slow, is_steady_noise
 from diagnosis.settings import Settings
@@ -128,6 +134,19 @@ def test_a_floor_that_resonates_is_ambient_vibration() -> None:
     assert floor.cost < about.cost - 100.0
     (answer,) = weigh_random_moments(whole_runs(base, ALL_RANDOM), [])
     assert answer.names == ("ambient_vibration",)
+
+
+def test_the_size_of_a_floors_moment_is_its_power_within_the_rigs_reach() -> None:
+    """Truth: the spectrum of the acceleration of a resonance under a white force, summed by frequency."""
+    part = FloorPart(0.05, 0.25, 5.0, source=SURROUNDINGS)
+    _, _, white = part.dynamics(1.0, 0.0)
+    step = 1e-3
+    frequency = np.arange(step, LONGEST_BANDWIDTH, step)
+    place = frequency / part.centre
+    gain = place**4 / ((1.0 - place**2) ** 2 + (2.0 * part.bandwidth / part.centre * place) ** 2)
+    power = 2.0 * white[2, 2] * float(np.sum(gain)) * step
+    assert part.intensity**2 + part.tail**2 == pytest.approx(power, rel=0.1)
+    assert part.tail > 0.1 * part.intensity
 
 
 @pytest.mark.slow
