@@ -189,10 +189,8 @@ def whitened(data: Data, colour: Colour) -> Data:
 
 
 _LOWEST_CORNER = 1e-3  # of the colour's lowest frequency: effectively none
-_THIRDS, _ABOUT = (
-    3,
-    3.0,
-)  # parts of a run, and the factor about the motion's frequency, in which noise may fade
+_THIRDS = 3  # parts of a run that are compared for noise that fades
+_ABOUT = 3.0  # factor about the motion's frequency, up and down, within which it may fade
 _WHITE = 30.0  # the level's natural logarithm stays within this distance of white noise
 
 
@@ -217,10 +215,8 @@ def zero_wanders(nominal: Fit, white: Fit, colour: Colour) -> bool:
         spectra.append((whole.frequency[whole.between], whole.power[whole.between]))
     frequency, power = (np.concatenate(column) for column in zip(*spectra, strict=True))
     relative = frequency / colour.frequency[0]
-    free, chance = (
-        _WANDERING.least_loss(relative, power),
-        chdtri(1, 2.0 * nominal.settings.noise.wandering_rate),
-    )
+    free = _WANDERING.least_loss(relative, power)
+    chance = chdtri(1, 2.0 * nominal.settings.noise.wandering_rate)
 
     def loses(process: _Process) -> bool:
         return bool(2.0 * (process.least_loss(relative, power) - free) / HANN > chance)
@@ -284,11 +280,12 @@ def _second_order(frequency: Array, corner: float, damping_ratio: float) -> tupl
 
 @dataclass(frozen=True)
 class _Process:
-    """A stationary process whose spectrum is level below its corner; or not, where the corner may be low.
+    """A process with a spectrum that is level below its corner.
 
     Args:
-        lowest: corner, over the lowest visible one.
-        starts: corners to start from, likewise.
+        power: power of the process by frequency, with its slopes, as in `_first_order`.
+        lowest: lowest corner, over the lowest visible one; a random walk's is far below that.
+        starts: corners at which fits start, likewise.
         damping: damping ratios of a resonance, lowest and highest; empty for a process of first order.
     """
 
@@ -301,7 +298,8 @@ class _Process:
         """Least negative log-likelihood of periodogram ordinates, nats, beside white noise.
 
         Args:
-            frequency: over the lowest visible corner.
+            frequency: frequencies over the lowest visible corner, shape (n,).
+            power: ordinates, shape (n,).
         """
 
         def loss(place: Array) -> tuple[float, Array]:

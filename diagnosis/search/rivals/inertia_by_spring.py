@@ -1,9 +1,8 @@
 """A cause from outside the vocabulary: an inertia that differs from spring to spring.
 
-Each spring has its adapter and its clamps, and they swing with the body. A spring that is not as stiff as stated
-changes the frequency of its runs alike; what the air adds to stiffness and damping then weighs as much as before.
-With another inertia, all of them weigh more or less. So runs with the wind off and on, or at two amplitudes of a
-nonlinear spring, tell the two apart.
+Each spring has its adapter and its clamps, and they swing with the body. Another stiffness changes the frequency in
+the runs of the spring. Another inertia also changes how fast they decay, and how far the air changes frequency and
+decay. So the decay, and runs with the wind off and on, tell the two apart.
 """
 
 from __future__ import annotations

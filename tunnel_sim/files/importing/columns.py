@@ -352,13 +352,10 @@ def _likeliest(channels: Sequence[Channel]) -> tuple[int, list[Channel]]:
             levels[5].append(c)
         elif kind in ("rate", "acceleration"):
             levels[6].append(c)
-    if any(
-        levels[at] for at in _LINEAR[:-1]
-    ):  # beside a column in mm, a column that may drive is not the reading
-        levels[_UNNAMED : _UNNAMED + 2] = [
-            [c for c in level if not names_input(c, DISPLACEMENT)]
-            for level in levels[_UNNAMED : _UNNAMED + 2]
-        ]
+    if any(levels[at] for at in _LINEAR[:-1]):
+        # beside a column in mm, a column that may drive is not the reading
+        for at in (_UNNAMED, _UNNAMED + 1):
+            levels[at] = [c for c in levels[at] if not names_input(c, DISPLACEMENT)]
     return next(((at, level) for at, level in enumerate(levels) if level), (len(levels), []))
 
 
