@@ -27,7 +27,7 @@ from diagnosis.answer.linear_theory import (
     influences,
     size_range,
 )
-from diagnosis.likelihood.least_squares import Fit, try_fit
+from diagnosis.likelihood.least_squares import Fit, fit_near
 from diagnosis.likelihood.starting_points import (
     StartingPoint,
     absorbed,
@@ -135,9 +135,9 @@ def _confirmed(fit: Fit, start: StartingPoint, linear: _Size, reach: float) -> _
         np.clip(linear.size, least, greatest)
     )  # a multiple of a trial may exceed its bound by rounding
     known: list[tuple[float, float]] = []
-    along = np.zeros_like(fit.point.common)  # change of the other parameters per unit of the size
+    near: tuple[float, Point] | None = None
     for _ in range(_REFITS):
-        again = _held(fit, start, size, fit.point.common + along * size)
+        again = _held(fit, start, size, near)
         if again is None:
             return None
         rise = (again.unlikelihood - limit) / reach
@@ -149,8 +149,8 @@ def _confirmed(fit: Fit, start: StartingPoint, linear: _Size, reach: float) -> _
                 size=size,
                 moves=_changes(fit, start, np.insert(again.point.common, start.scaled, size)),
             )
-        if rise < 1.0:
-            along = (again.point.common[: along.size] - fit.point.common) / size
+        if rise < 1.0 or near is None:
+            near = size, again.point
         known.append((size, float(max(rise, _LEAST_RISE) ** (0.25 if start.second_order else 0.5))))
         further = float(np.clip(_nearer(known), least, greatest))
         if further == size:  # all sizes of the range are allowed
@@ -178,18 +178,24 @@ def _nearer(known: Sequence[tuple[float, float]]) -> float:
     return float(np.clip(further / size, 1.0 / _WIDEST, _WIDEST)) * size
 
 
-def _held(fit: Fit, start: StartingPoint, size: float, common: Array) -> Fit | None:
+def _held(fit: Fit, start: StartingPoint, size: float, near: tuple[float, Point] | None) -> Fit | None:
     """The fit with an effect held at a size and its other parameters free; None where it fails.
 
     Args:
-        common: starting values, common parameters of the given fit, shape (common,).
+        near: another size and the refit's point there, from which the refit starts; None: from the fit.
     """
     assert start.scaled is not None
     name, problem = start.problem.names[start.scaled], start.problem
     problem = replace(problem, fixed=(*problem.fixed, (name, size)), scatter=fit.problem.scatter)
-    own = np.delete(start.point.common, start.scaled)[common.size :]
-    point = Point(np.concatenate([common, own]), fit.point.per_run.copy())
-    return try_fit(problem, point, base=fit, tolerance=_TOLERANCE, max_iterations=_STEPS)
+    common, per_run = fit.point.common, fit.point.per_run
+    if near is None:
+        own = np.delete(start.point.common, start.scaled)[common.size :]
+    else:
+        there, part = near[1], size / near[0]
+        own = there.common[common.size :]
+        common = common + part * (there.common[: common.size] - common)
+        per_run = per_run + part * (there.per_run - per_run)
+    return fit_near(problem, Point(np.concatenate([common, own]), per_run.copy()), fit, max_iterations=_STEPS)
 
 
 def _changes(fit: Fit, start: StartingPoint, there: Array) -> Array:
@@ -208,7 +214,6 @@ def _changes(fit: Fit, start: StartingPoint, there: Array) -> Array:
 
 _REFITS = 10
 _STEPS = 10  # iterations of a refit, which starts at the fit
-_TOLERANCE = 1e-6  # tolerance of its χ², small enough to compare rises of a few units
 _CONFIRMED = 0.1  # greatest distance of a rise from the limit's rise, as a share of the latter
 _CLOSE = 1.1  # maximum ratio of a size beyond the limit to one within it, for both to confirm the limit
 _WIDEST = 10.0  # greatest factor between two sizes that are refitted
