@@ -66,10 +66,11 @@ from diagnosis.where.described import Nowhere, PlaceFound, Where, described, now
 from diagnosis.where.maps import Maps
 from diagnosis.where.place import blow_interval
 from diagnosis.where.survey import with_answer
-from identification import identify
+from identification._identify import identify_examined
 from identification.estimate import Estimate
+from identification.estimators import make_estimator
 from identification.show.quantity import Quantity
-from identification.status import Remark, left_out_as_asked
+from identification.status import Examined, Remark, left_out_as_asked
 from tunnel_sim.effects import BetweenRuns, effect_class
 from tunnel_sim.effects.capabilities import SecondOscillation
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -390,7 +391,7 @@ def _predictions(
 
 
 def _identified(study: Study, chosen: Chosen) -> Estimate | None:
-    """The estimate by `identify`; None if a cause acts, or the estimate would be of another model or other runs."""
+    """The estimate as by `identify`; None if a cause acts, or it would be of another model or other runs."""
     scatter_alone = study.causes != UNKNOWN and all(
         issubclass(effect_class(name), BetweenRuns) for name in study.causes
     )
@@ -398,8 +399,9 @@ def _identified(study: Study, chosen: Chosen) -> Estimate | None:
     if not scatter_alone or study.disturbed or chosen.limit_cycles or own_model:
         return None
     try:
-        return identify(chosen.campaign.as_angle, throw=False)
-    except TunnelError:  # the examination refuses runs that the diagnosis may still compare
+        examined = Examined(chosen.campaign.as_angle, chosen.remarks)
+        return identify_examined(examined, make_estimator("output_error"))
+    except TunnelError:  # the diagnosis may compare runs that cannot be identified
         return None
 
 

@@ -22,7 +22,7 @@ from identification.progress import Progress, shown_by
 from identification.returned import checked_return
 from identification.signal.known_gain import refuse_other_gains
 from identification.statistics import widened_by_contradictions, widened_by_rounding, withheld
-from identification.status import Outcome, Remark, left_out_as_asked
+from identification.status import Examined, Outcome, Remark, left_out_as_asked
 from identification.trade_off import of_coefficients
 from tunnel_sim.files.as_campaign import as_campaign
 from tunnel_sim.processes import one_blas_thread
@@ -85,7 +85,26 @@ def _identified(
         what = f"the run is driven, and {chosen.name} takes free decays only"
         raise TunnelError(what, where=f"{campaign.name}, run '{campaign.driven_runs[0].id}'", remedy=remedy)
     refuse_other_gains(campaign.checked_inputs())
-    examined = examine(campaign).accepted()
+    estimate = identify_examined(examine(campaign).accepted(), chosen, campaign)
+    estimate = replace(
+        estimate, remarks=(*left_out_as_asked(leave_out), *_assumed(campaign), *estimate.remarks)
+    )
+    if throw and estimate.status.failed:
+        what, _, remedy = estimate.status.value.partition(": ")
+        raise TunnelError(what, where=campaign.name, remedy=remedy)
+    return estimate
+
+
+def identify_examined(examined: Examined, chosen: Estimator, campaign: Campaign | None = None) -> Estimate:
+    """Identify runs that are examined and accepted, as `identify` does after its own examination.
+
+    Args:
+        campaign: all runs before the examination; None: those of ``examined``.
+
+    Raises:
+        TunnelError: where the estimator refuses the runs; a `WrongReturn` as by `identify`.
+    """
+    campaign = examined.campaign if campaign is None else campaign
     remaining = examined.campaign
     # the filter does not need the decay rate, which these runs cannot give
     random = (
@@ -118,15 +137,9 @@ def _identified(
     contradicted = any("inertias_kg_m2" in one.figures for one in examined.remarks)
     if not contradicted and (pair := pair_remark(remaining, estimate.runs)) is not None:
         estimate = replace(estimate, remarks=(*estimate.remarks, pair))
-    estimate = replace(
-        estimate,
-        remarks=(*left_out_as_asked(leave_out), *_assumed(campaign), *estimate.remarks),
-        trade_off=of_coefficients(estimate.parameters, estimate.covariance_matrix, remaining),
+    return replace(
+        estimate, trade_off=of_coefficients(estimate.parameters, estimate.covariance_matrix, remaining)
     )
-    if throw and estimate.status.failed:
-        what, _, remedy = estimate.status.value.partition(": ")
-        raise TunnelError(what, where=campaign.name, remedy=remedy)
-    return estimate
 
 
 def _assumed(campaign: Campaign) -> tuple[Remark, ...]:
