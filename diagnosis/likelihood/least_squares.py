@@ -26,6 +26,7 @@ _MAX_ITERATIONS = 25
 _HOPELESS = 5  # steps after which a fit must be better than the fit without the added effect
 _AT_BOUND = 1e-9  # relative: a step beyond the range is cut to its end exactly
 _CORRECTIONS = 2  # maximum number of further steps of the runs' own parameters
+_CORRECTED = 1e-3  # drop of χ² below which such a step is not worth its simulation
 # share of the greatest eigenvalue: a smaller eigenvalue belongs to an undetermined direction
 _SINGULAR = 1e-12
 _TAKES_PART = 1e-6  # share of a unit vector: smaller parts are rounding
@@ -401,12 +402,18 @@ class _State:
         """
         for _ in range(_CORRECTIONS):
             pull = self.problem.parameters.pull(trial.point)
-            with np.errstate(invalid="ignore"):
+            with np.errstate(over="ignore", invalid="ignore"):  # a run diverged
                 *_, solutions = normal_equations(
                     self.jacobian, trial.residuals, self.damping, self.products, pull
                 )
-            point = Point(trial.point.common, trial.point.per_run + solutions[:, :, -1])
-            nearer = _Place.of(self.problem, point)
+                step = solutions[:, :, -1]
+                gradient = pull + [
+                    own.T @ r for (_, own), r in zip(self.jacobian, trial.residuals, strict=True)
+                ]
+                foreseen = float(np.sum(gradient * step))
+            if foreseen < _CORRECTED:
+                break
+            nearer = _Place.of(self.problem, Point(trial.point.common, trial.point.per_run + step))
             if not nearer.cost < trial.cost:
                 break
             trial = nearer
