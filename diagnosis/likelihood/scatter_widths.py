@@ -24,6 +24,7 @@ from identification.campaign.random_effects import (
     WidthPrior,
     likeliest_widths,
     marginal,
+    restricted_costs,
 )
 from tunnel_sim.vocabulary.quantities import PerKind, PerRun
 from tunnel_sim.vocabulary.record import Array
@@ -128,9 +129,8 @@ class ScatterColumns:
         first = prior.usual if start is None else np.clip(start, prior.least, prior.most)
         # a further parameter may act like a width: then there are several maxima
         narrower = (first, np.maximum(_NARROWER * first, prior.least), prior.least)
-        tries = [np.array(one) for one in product(*zip(*narrower, strict=True))]
-        costs = [marginal(self.products, one).restricted + prior.cost(one) for one in tries]
-        starts = {0, int(np.argmin(costs))}
+        tries = np.array(list(product(*zip(*narrower, strict=True))))
+        starts = {0, int(np.argmin(restricted_costs(self.products, prior, tries)))}
         ends = (likeliest_widths(self.products, prior, tries[one]) for one in sorted(starts))
         return min((self.at(widths, prior) for widths in ends), key=lambda one: one.restricted)
 

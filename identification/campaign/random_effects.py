@@ -298,8 +298,7 @@ def _density(runs: RunProducts, prior: WidthPrior, axes: Sequence[Array]) -> Arr
     """Density of the logarithms of the widths over a grid, scaled to a maximum of 1, of the axes' shape."""
     points = np.stack([one.ravel() for one in np.meshgrid(*axes, indexing="ij")], axis=1)
     parts = [points[i : i + _AT_ONCE] for i in range(0, len(points), _AT_ONCE)]
-    cost = np.concatenate([_restricted(runs, part) for part in parts])
-    cost += np.array([prior.cost(point) for point in points])
+    cost = np.concatenate([restricted_costs(runs, prior, part) for part in parts])
     return np.asarray(np.exp(-0.5 * (cost - cost.min())).reshape([axis.size for axis in axes]), np.float64)
 
 
@@ -308,8 +307,15 @@ def _along(density: Array, place: int) -> Array:
     return np.asarray(density.sum(axis=tuple(j for j in range(density.ndim) if j != place)), np.float64)
 
 
-def _restricted(runs: RunProducts, widths: Array) -> Array:
-    """−2 ln L of many widths, as `Marginal.restricted`, shape (points,); the widths have the shape (points, k)."""
+def restricted_costs(runs: RunProducts, prior: WidthPrior, widths: Array) -> Array:
+    """−2 ln of the restricted likelihood (`Marginal.restricted`) times the prior at many widths, up to a constant.
+
+    Args:
+        widths: shape (points, k).
+
+    Returns:
+        Dimensionless, shape (points,).
+    """
     scale = widths[:, None, :, None] * widths[:, None, None, :]
     inverse = np.linalg.inv(np.eye(widths.shape[1]) + scale * runs.own)
     weight = scale * inverse
@@ -322,4 +328,5 @@ def _restricted(runs: RunProducts, widths: Array) -> Array:
     alone = np.einsum("rk,grkl,rl->g", runs.own_seen, weight, runs.own_seen)
     information = np.linalg.slogdet(scaled)[1] + 2.0 * np.log(size).sum(axis=1)
     cost = -np.linalg.slogdet(inverse)[1].sum(axis=1) - alone - explained + information
-    return np.asarray(cost + runs.power.sum(), np.float64)
+    cost += runs.power.sum() + np.array([prior.cost(point) for point in widths])
+    return np.asarray(cost, np.float64)
