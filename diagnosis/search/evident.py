@@ -20,12 +20,14 @@ EVIDENT_FROM: Final = 20.0
 """Minimum drop of χ² for a further effect beside a random moment to be evident. Judgement. Two parameters
 lower χ² by more than 20 by chance once in 22,000 effects tried."""
 
+_DETERMINED = 1e-12  # minimum eigenvalue of a determined direction, as a share of the greatest
+
 
 def evident(top: Hypothesis, kinds: Sequence[type[Effect]]) -> list[Hypothesis]:
     """The set with one more effect that is evident beside the random moment; the most evident first.
 
-    The noise is estimated from the residuals, and the real spectrum differs from the model's. The scatter
-    between the runs therefore shows how much of a drop of χ² is chance. An effect with an instant in every run
+    The noise is estimated from the residuals, and the real spectrum differs from the model's. The differences
+    between the runs therefore show how much of a drop of χ² is chance. An effect with an instant in every run
     must lower χ² for each instant as well.
     """
     if len(top.effects) >= MOST_CAUSES:
@@ -56,10 +58,11 @@ def needed(top: Hypothesis) -> Hypothesis:
     """
     known = top.fit
     for kind in known.problem.effects:
-        severity, reach = f"{kind.name}.{kind.parameters()[0].name}", EVIDENT_FROM * _numbers(known, kind)
+        severity = f"{kind.name}.{kind.parameters()[0].name}"
         if severity not in known.problem.names:
             continue
-        if known.value(severity) ** 2 < reach * known.std(severity) ** 2:
+        variance = overdispersion(known, kind) * known.std(severity) ** 2
+        if known.value(severity) ** 2 < EVIDENT_FROM * _numbers(known, kind) * variance:
             rest = tuple(name for name in top.effects if name != kind.name)
             start = restricted(known, rest)
             without = try_fit(start.problem, start.point)
@@ -71,16 +74,20 @@ def needed(top: Hypothesis) -> Hypothesis:
 def overdispersion(fitted: Fit, kind: type[Effect]) -> float:
     """Factor by which the variance of an effect's parameters exceeds its value in independent noise, 1 or more.
 
+    An effect that one run shows almost alone may be an odd run; the variance is then mostly the disagreement of the
+    other runs.
+
     Returns:
-        The mean over the parameters, from the scatter of the runs' gradients, which sum to zero (the sandwich
-        covariance with the runs as clusters; Liang and Zeger, Biometrika 73 (1986) 13).
+        The mean over the parameters, from the changes of the estimate as each run is left out, by linear theory
+        (jackknife with the runs as clusters; Bell and McCaffrey, Survey Methodology 28 (2002) 169).
     """
     matrices, gradients, _ = by_run(fitted.jacobian, fitted.residuals, products=fitted.products)
     own = [i for i, name in enumerate(fitted.problem.names) if name.split(".")[0] == kind.name]
     total = matrices.sum(axis=0)
     size = np.sqrt(np.maximum(np.diag(total), 1e-300))
-    inverse = np.linalg.pinv(total / np.outer(size, size), rcond=1e-12)
-    scatter = (gradients / size).T @ (gradients / size) * len(gradients) / max(len(gradients) - 1, 1)
-    robust = (inverse @ scatter @ inverse)[np.ix_(own, own)]
-    naive = inverse[np.ix_(own, own)]
-    return max(1.0, float(np.trace(np.linalg.pinv(naive) @ robust)) / max(len(own), 1))
+    by_size, count = np.outer(size, size), len(gradients)
+    inverse = np.linalg.pinv(total / by_size, rcond=_DETERMINED, hermitian=True)
+    without = np.linalg.pinv((total - matrices) / by_size, rcond=_DETERMINED, hermitian=True)
+    changes = np.einsum("rij,rj->ri", without, gradients / size)[:, own]
+    robust = changes.T @ changes * (count - 1) / count
+    return max(1.0, float(np.trace(np.linalg.pinv(inverse[np.ix_(own, own)]) @ robust)) / max(len(own), 1))

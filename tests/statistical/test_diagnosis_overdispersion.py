@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from diagnosis.likelihood.least_squares import fit
+from diagnosis.likelihood.normal_equations import normal_equations
 from diagnosis.likelihood.problem import Problem
-from diagnosis.likelihood.starting_points import starting_points
+from diagnosis.likelihood.starting_points import project_out, starting_points
 from diagnosis.search.evident import overdispersion
 from diagnosis.search.random_moments import follows_the_motion
-from tests.support.gap_campaigns import campaign, nominal
+from tests.support.gap_campaigns import CONDITIONS, campaign, nominal
 from tunnel_sim.effects import effect_class, effect_from
 
 KIND = effect_class("quadratic_damping")
@@ -18,15 +19,16 @@ KIND = effect_class("quadratic_damping")
 
 @pytest.fixture(scope="module")
 def fitted():
-    """Six runs with quadratic damping, and the effect fitted."""
-    base = nominal(campaign(effect_from("quadratic_damping", {"coefficient": 0.003})))
+    """Twelve runs with quadratic damping, and the effect fitted."""
+    effect = effect_from("quadratic_damping", {"coefficient": 0.003})
+    base = nominal(campaign(effect, conditions=2 * CONDITIONS))
     start = starting_points(base, KIND)[0]
     assert isinstance(start.problem, Problem)
     return fit(start.problem, start.point)
 
 
 def drawn(fitted, rng, share):
-    """Residuals of white noise, and of a coefficient that scatters between the runs.
+    """A fit's residuals in white noise, and with a coefficient that scatters between the runs.
 
     Args:
         share: standard deviation of a run's own coefficient over that which the noise gives it in one run.
@@ -38,19 +40,34 @@ def drawn(fitted, rng, share):
         alone = column - release @ np.linalg.lstsq(release, column, rcond=None)[0]
         own = share * rng.normal() / np.sqrt(alone @ alone)
         residuals.append(rng.normal(size=column.size) + own * column)
-    return replace(fitted, residuals=residuals)
+    return replace(fitted, residuals=project_out(fitted, residuals))
 
 
 @pytest.mark.parametrize("share", [0.0, 5.0])
 def test_the_scatter_between_runs_is_told_from_that_of_the_noise(fitted, share):
     """Truth: the variance is 1 + share² times that of the noise where one coefficient is free.
 
-    The model's own four coefficients take part of it, and six runs know it badly: a factor of two either way.
+    Twelve runs estimate the mean of many campaigns within a factor of two either way.
     """
     rng = np.random.default_rng(11)
     found = [overdispersion(drawn(fitted, rng, share), KIND) for _ in range(200)]
     assert 0.5 < np.mean(found) / (1.0 + share**2) < 2.0
     assert min(found) >= 1.0
+
+
+def test_an_effect_that_one_run_alone_shows_has_the_disagreement_of_the_others(fitted):
+    """Truth: the first run, a thousand times as precise as the others, has a coefficient that they contradict.
+
+    The fit follows this run, so no residual of its own shows the disagreement.
+    """
+    place, away, precise = fitted.problem.names.index("quadratic_damping.coefficient"), 1e-3, 1e3
+    jacobian = [(c * precise, r * precise) if i == 0 else (c, r) for i, (c, r) in enumerate(fitted.jacobian)]
+    residuals = [c[:, place] * (away if i == 0 else 0.0) for i, (c, _) in enumerate(jacobian)]
+    odd = replace(fitted, jacobian=jacobian)
+    matrix, _, _ = normal_equations(jacobian, residuals)
+    variance = float(np.linalg.inv(matrix)[place, place])
+    found = overdispersion(replace(odd, residuals=project_out(odd, residuals)), KIND)
+    assert found * variance == pytest.approx(away**2, rel=0.2)
 
 
 @pytest.mark.parametrize(
