@@ -16,6 +16,7 @@ from tunnel_lab.bench.fields import Changed, field_of
 from tunnel_lab.bench.parts import asked_in, label_of, name_of, show_command, text_of
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.files.importing.choices import ImportChoices, read_recipe
+from tunnel_sim.files.importing.condition_names import SETTABLE
 from tunnel_sim.files.importing.remarks import ImportRemark
 from tunnel_sim.files.toml_input import validate
 from tunnel_sim.files.writing import write_whole
@@ -117,7 +118,7 @@ def state(session: Session, changes: Mapping[str, Any]) -> None:
 
 def settings_of(choices: ImportChoices) -> str:
     """The conditions that are stated for all runs, in the format of ``--set``."""
-    numbers = choices.conditions.model_dump(exclude_none=True)
+    numbers = choices.conditions.model_dump(include={*SETTABLE}, exclude_none=True)
     names = choices.stated_by.model_dump(exclude_none=True)
     stated = [f"{key}={text_of(value)}" for key, value in numbers.items()]
     return ", ".join([*stated, *(f"{key}={name}" for key, name in names.items())])

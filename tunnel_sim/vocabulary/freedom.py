@@ -158,6 +158,12 @@ class Freedom:
         return "".join(part if place % 2 else self._said(part, scale) for place, part in enumerate(parts))
 
     def _said(self, text: str, scale: float) -> str:
+        return "".join(
+            f"{part} in {_variables(part)}" if place % 2 else self._plain(part, scale)
+            for place, part in enumerate(_FORMULA.split(text))
+        )
+
+    def _plain(self, text: str, scale: float) -> str:
         text = _CONSTANT.sub(lambda found: f"{float(found[1]) / scale:.3g} rad", text)
         for old, new in self._words:
             text = _compiled(old).sub(lambda found, new=new: _as_capital(found[0], found.expand(new)), text)  # type: ignore[misc]
@@ -279,6 +285,17 @@ class Freedom:
         found = _OWN_UNIT.search(name)
         plain = (unit or (found[1].replace("_", "/") if found else "")).translate(_PLAIN)
         return "kN" if plain == "kn" else plain  # a knot measures wind only
+
+
+_FORMULA = re.compile(r"(?<=[Tt]he formula )(\S+)(?= explains)")
+_VARIABLES = {"b": "displacement b", "r": "rate r", "y": "reading y", "t": "time t", "Kr": "spring's Kr"}
+"""The names in a formula are the same for every motion, as in an effects file."""
+
+
+def _variables(formula: str) -> str:
+    """The meaning of the names in a formula, in words."""
+    held = [f"the {words}" for name, words in _VARIABLES.items() if re.search(rf"\b{name}\b", formula)]
+    return " and ".join(filter(None, [", ".join(held[:-1]), *held[-1:]])) or "its parameters"
 
 
 _CONSTANT = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?) rad\b")
@@ -430,7 +447,7 @@ DISPLACEMENT = Freedom(
         (r"\b[Ss]wing(s?)\b", r"move\1"),
         # symbols
         (r"\bIzz\b", "m"),
-        (r"\bKr\b(?!\*)", "k"),  # a formula has names of its own
+        (r"(?<!\*)(?<!spring's )\bKr\b(?!\*)", "k"),  # a formula has names of its own
         (r"\bCr\b", "c"),
         ("β\u0308", "x\u0308"),
         ("β\u0307", "x\u0307"),

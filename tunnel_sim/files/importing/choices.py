@@ -12,8 +12,8 @@ from pydantic import Field
 
 from tunnel_sim.files.campaign_folder import IMPORT_RECIPE
 from tunnel_sim.files.importing.choice_options import CHOICES
-from tunnel_sim.files.importing.condition_names import Conditions, in_si, units_of
-from tunnel_sim.files.importing.units import known_unit
+from tunnel_sim.files.importing.condition_names import SETTABLE, Conditions, in_si, units_of
+from tunnel_sim.files.importing.units import known_unit, squeezed
 from tunnel_sim.files.plausible import plausible_values
 from tunnel_sim.files.toml_input import (
     OneLine,
@@ -25,7 +25,7 @@ from tunnel_sim.files.toml_input import (
     validate,
 )
 from tunnel_sim.vocabulary.errors import TunnelError, one_line
-from tunnel_sim.vocabulary.freedom import OwnInputColumn
+from tunnel_sim.vocabulary.freedom import DISPLACEMENT, Motion, OwnInputColumn
 from tunnel_sim.vocabulary.inputs import Hold
 
 
@@ -167,15 +167,24 @@ def _possible(key: str, factor: float, value: float) -> bool:
     return True
 
 
-def _factor(key: str, unit: str, where: str) -> float:
-    """The factor to SI of a condition in a unit as a user writes it."""
-    factor = in_si(key, known_unit(unit) or unit)
-    if factor is None:
-        allowed = units_of(key)
-        what = f"'{one_line(unit, 20)}' is not a unit of {key}"
-        remedy = f"use one of {allowed}" if allowed != "1" else f"give {key} as a number without a unit"
-        raise TunnelError(what, where=where, remedy=remedy)
-    return factor
+def _factor(key: str, unit: str, where: str) -> tuple[float, Motion | None]:
+    """The factor to SI of a condition in a unit as a user writes it, and the motion if only one has the unit."""
+    named = known_unit(unit) or unit
+    factor = in_si(key, named)
+    if factor is not None:
+        return factor, "angle" if DISPLACEMENT.unit(named) != named else None
+    twins = {
+        own: size * of_angle
+        for own, (twin, size) in DISPLACEMENT.condition_units.items()
+        if (of_angle := in_si(key, twin)) is not None
+    }
+    for own, factor in twins.items():
+        if squeezed(own) == squeezed(unit):
+            return factor, "displacement"
+    allowed = units_of(key) + (f"; of a displacement {', '.join(twins)}" if twins else "")
+    what = f"'{one_line(unit, 20)}' is not a unit of {key}"
+    remedy = f"use one of {allowed}" if allowed != "1" else f"give {key} as a number without a unit"
+    raise TunnelError(what, where=where, remedy=remedy)
 
 
 def parse_times(words: Sequence[str], option: str) -> dict[str, float]:
@@ -203,7 +212,7 @@ def parse_setting(text: str, where: str) -> tuple[Conditions, StatedBy]:
     Raises:
         TunnelError: for a text of any other form, or a unit that does not measure the condition.
     """
-    numbers: dict[str, float] = {}
+    numbers: dict[str, Any] = {}
     names: dict[str, str] = {}
     for part in _settings_in(text):
         key, _, value = (piece.strip() for piece in part.partition("="))
@@ -212,12 +221,14 @@ def parse_setting(text: str, where: str) -> tuple[Conditions, StatedBy]:
         except ValueError:
             if not value:
                 what = f"'{part.strip()}' is not of the form key=number"
-                remedy = f"give for example wind_speed=12.5; keys are {', '.join(Conditions.model_fields)}"
+                remedy = f"give for example wind_speed=12.5; keys are {', '.join(SETTABLE)}"
                 raise TunnelError(what, where=where, remedy=remedy) from None
             number = _WITH_UNIT.fullmatch(value)
-            if number is None or key not in Conditions.model_fields:
+            if number is None or key not in SETTABLE:
                 names[key] = value
             else:
-                factor = _factor(key, number[2], where)
+                factor, motion = _factor(key, number[2], where)
                 numbers[key] = factor * option_number(number[1], where, partial(_possible, key, factor))
+                if motion is not None:
+                    numbers["motion"] = motion
     return validate(Conditions, numbers, Path(where)), validate(StatedBy, names, Path(where))

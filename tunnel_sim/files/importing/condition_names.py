@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from tunnel_sim.files.importing.units import UNITS, kind_of, squeezed
 from tunnel_sim.files.scatter_tables import SPREAD, Spread
 from tunnel_sim.files.toml_input import NotNegative, Positive, StrictModel, optional
+from tunnel_sim.vocabulary.freedom import Motion
 
 
 class Conditions(StrictModel):
@@ -30,6 +31,7 @@ class Conditions(StrictModel):
     repeatability_wind_speed: Spread | None = optional(SPREAD)
     repeatability_spring_stiffness: Spread | None = optional(SPREAD)
     repeatability_mechanical_damping: Spread | None = optional(SPREAD)
+    motion: Motion | None = optional("'angle' or 'displacement', of which a condition has its unit")
 
 
 RIG_KEYS = ("yaw_inertia", "frontal_area", "reference_length", "width")
@@ -38,6 +40,9 @@ OF_REPEATABILITY = "repeatability_"
 """Prefix of the keys of ``[repeatability]`` beside conditions of the same names."""
 
 SPREAD_KEYS = tuple(key for key in Conditions.model_fields if key.startswith(OF_REPEATABILITY))
+SETTABLE = tuple(key for key in Conditions.model_fields if key != "motion")
+"""The keys of numbers."""
+
 OF_CAMPAIGN = (*RIG_KEYS, *SPREAD_KEYS)
 """The keys that are the same in all runs."""
 

@@ -66,6 +66,14 @@ class ImportStatements:
                 what, where=shown(self.table.path), remedy="give it in the unit of an angle, or --unit"
             )
         stated = self.choices.conditions.model_dump(exclude_none=True)
+        motion = stated.pop("motion", freedom.motion)
+        if motion != freedom.motion:
+            what = (
+                f"a condition is in a unit of motion = '{motion}', and the readings are of '{freedom.motion}'"
+            )
+            raise TunnelError(
+                what, where="--set", remedy="correct its unit, or give --unit with the readings'"
+            )
         own = freedom.as_angle(stated, "--set", imported=True)
         if not freedom.windy:
             own = {"wind_speed": 0.0, **own}

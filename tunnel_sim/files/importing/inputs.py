@@ -50,7 +50,8 @@ def names_input(channel: Channel, freedom: Freedom) -> bool:
     """Whether a column may be an input of a motion, by its name and unit, and is not a condition."""
     claimed = is_input(channel) or _claimed(channel, freedom) is not None
     plausible = claimed or _NAMES.search(channel.name) is not None
-    return plausible and condition_of(channel.name, channel.unit) is None
+    # in the unit of the motion: beside a displacement, kN has been written as knots are
+    return plausible and condition_of(channel.name, freedom.input_unit(channel.name, channel.unit)) is None
 
 
 def find_input(

@@ -86,6 +86,7 @@ def test_a_proposed_law_has_own_units_and_the_true_sizes(
     assert answer.closable is not None
     assert not re.search(FORBIDDEN, answer.closable.words)
     assert " N/m" in answer.closable.words
+    assert " in the displacement b explains " in answer.closable.words
 
 
 def test_a_proposed_law_is_found_again(found: tuple[Diagnosis, Campaign, float], tmp_path: Path) -> None:

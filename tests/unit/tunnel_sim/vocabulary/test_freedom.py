@@ -64,6 +64,11 @@ def test_the_twins_of_effects_have_the_dimension_of_a_displacement() -> None:
         ("two degrees of freedom", "two degrees of freedom"),
         ("−Kr β − Cr β\u0307", "−k x − c x\u0307"),
         ("ωn [rad/s]", "ωn [1/s]"),
+        (
+            "The formula k*b*Kr explains 90 %",
+            "The formula k*b*Kr in the displacement b and the spring's Kr explains 90 %",
+        ),
+        ("The formula k*sign(r) explains 90 %", "The formula k*sign(r) in the rate r explains 90 %"),
     ],
 )
 def test_words(text: str, own: str) -> None:

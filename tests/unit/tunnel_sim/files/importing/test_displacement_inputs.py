@@ -12,9 +12,10 @@ from scipy.integrate import solve_ivp
 
 from tests.support.linear import FORBIDDEN
 from tests.support.robot_logs import JOINT_STATE, START_NS, joint_state, write_mcap
+from tunnel_lab.bench.preview import settings_from, settings_of
 from tunnel_lab.plotting.runs import import_picture
 from tunnel_sim.files.campaign_folder import read_campaign
-from tunnel_sim.files.importing.choices import ImportChoices
+from tunnel_sim.files.importing.choices import ImportChoices, parse_setting, read_recipe
 from tunnel_sim.files.importing.condition_names import Conditions
 from tunnel_sim.files.importing.records import Imported, read_records
 from tunnel_sim.files.importing.writing import import_records
@@ -59,6 +60,7 @@ def said(imported: Imported) -> str:
     [
         ("time (s),x (mm),force (N)", 1.0, "moment_nm", 1.0),
         ("time (s),x (mm),load (kN)", 1e-3, "moment_nm", 1.0),
+        ("time (s),x (mm),u (kN)", 1e-3, "moment_nm", 1.0),
         ("time (s),x (mm),push (mN)", 1e3, "moment_nm", 1.0),
         ("t_s,pos_mm,force_N", 1.0, "moment_nm", 1.0),
         ("t/s,x/mm,F/N", 1.0, "moment_nm", 1.0),
@@ -177,6 +179,43 @@ def test_a_prismatic_joint_of_a_robot_log(tmp_path: Path) -> None:
     assert run.drive is not None
     assert run.drive.column == "moment_nm"
     np.testing.assert_allclose(run.drive.values, PUSH)
+
+
+@pytest.mark.parametrize(
+    ("setting", "si"),
+    [("50 N/m", 50.0), ("0,05 N/mm", 50.0), ("0.05 kN/m", 50.0), ("50", 50.0)],
+)
+def test_a_stiffness_is_stated_in_a_unit_of_the_motion(tmp_path: Path, setting: str, si: float) -> None:
+    stated, _ = parse_setting(f"spring_stiffness={setting}", "--set")
+    choices = ImportChoices(conditions=stated)
+    path = file_of(tmp_path, "time (s),x (mm),force (N)", 1e3 * READING, PUSH)
+    assert read_records([path], choices).campaign.runs[0].spring_stiffness == pytest.approx(si)
+    import_records([path], tmp_path / "c", choices)
+    assert read_recipe(tmp_path / "c").conditions == stated
+    assert settings_from(settings_of(choices))["conditions"]["spring_stiffness"] == pytest.approx(si)
+
+
+@pytest.mark.parametrize(
+    ("unit", "heading", "motions"),
+    [
+        ("N m/rad", "time (s),x (mm),force (N)", ("angle", "displacement")),
+        ("N/m", "time (s),yaw (mrad),torque (Nm)", ("displacement", "angle")),
+    ],
+)
+def test_a_stiffness_in_a_unit_of_the_other_motion_is_refused(
+    tmp_path: Path, unit: str, heading: str, motions: tuple[str, str]
+) -> None:
+    stated, _ = parse_setting(f"spring_stiffness=50 {unit}", "--set")
+    path = file_of(tmp_path, heading, 1e3 * READING, PUSH)
+    with pytest.raises(TunnelError, match=f"motion = '{motions[0]}', and the readings are of '{motions[1]}'"):
+        read_records([path], ImportChoices(conditions=stated))
+
+
+def test_units_of_both_motions_are_named_for_a_unit_of_neither() -> None:
+    with pytest.raises(TunnelError, match=r"use one of N m/rad, .*; of a displacement N/m, N/mm, kN/m"):
+        parse_setting("spring_stiffness=50 N", "--set")
+    with pytest.raises(TunnelError, match=r"use one of m/s,[^;]*$"):
+        parse_setting("wind_speed=5 N", "--set")
 
 
 def test_a_mass_of_an_angle_is_asked_about(tmp_path: Path) -> None:
