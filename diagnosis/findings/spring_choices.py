@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 from diagnosis.findings.finding import NextStep
 from diagnosis.search.rivals.two_springs import ONE_SPRING, SpringError, spring_error
 from diagnosis.search.study import Study
-from identification.show.numbers import for_people, listed, plain, probability
+from identification.show.numbers import for_people, listed, probability
 
 
 def spring_choices(study: Study) -> tuple[SpringError, ...]:
@@ -45,7 +44,7 @@ def choice_words(found: Sequence[SpringError]) -> str:
     """Which of the springs may be off, where the runs cannot tell; empty where they can."""
     if not found:
         return ""
-    springs = [f"{_spring_off(one)} ({probability(one.probability or 0.0)})" for one in found]
+    springs = [f"{one.words} ({probability(one.probability or 0.0)})" for one in found]
     return (
         f"{one_of_springs(found).capitalize()}, and these runs do not show which: {', or '.join(springs)}. The "
         f"coefficients are averaged over {'both' if len(found) == 2 else 'them'}."
@@ -65,33 +64,3 @@ def choice_steps(found: Sequence[SpringError]) -> list[NextStep]:
             "shows which of them is off",
         )
     ]
-
-
-def _spring_off(found: SpringError) -> str:
-    """A spring that may be off, such as ``16.12 N m/rad is 1.96 % softer than stated``."""
-    size = for_people(100.0 * abs(found.error), 100.0 * found.std, "%")
-    side = "stiffer" if found.error > 0.0 else "softer"
-    return f"{found.stiffness:g} N m/rad is {size} {side} than stated"
-
-
-def two_springs_words(found: Mapping[str, Any]) -> str:
-    """Springs that would explain the gap together."""
-    beside = f" beside {plain(*found['beside'])}" if found["beside"] else ""
-    springs = " and ".join(_spring_off(SpringError(**one)) for one in found["springs"])
-    return (
-        f"Two springs that are not as stiff as stated would explain the gap{beside}: for example, "
-        f"{springs}. Measure their stiffness again."
-    )
-
-
-def inertia_by_spring_words(found: Mapping[str, Any]) -> str:
-    """An inertia that differs from spring to spring and would explain the gap."""
-    beside = f" beside {plain(*found['beside'])}" if found["beside"] else ""
-    each = [
-        f"{for_people(100.0 * one.error, 100.0 * one.std, '%')} with the spring of {one.stiffness:g} N m/rad"
-        for one in (SpringError(**given) for given in found["springs"])
-    ]
-    return (
-        f"An inertia that differs from spring to spring would explain the gap{beside}: {listed(each)}, against the "
-        "softest spring. Weigh the adapters and clamps of the springs."
-    )

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 from diagnosis.findings.coefficients import consequence
 from diagnosis.findings.disturbed_runs import disturbed_words, odd_runs
@@ -11,8 +10,7 @@ from diagnosis.findings.input_hold import hold_words
 from diagnosis.findings.other_motions import second_mode_words
 from diagnosis.findings.patch import model_words
 from diagnosis.findings.place import runs_of_the_gap
-from diagnosis.findings.second_inertia import second_inertia_words
-from diagnosis.findings.spring_choices import choice_words, inertia_by_spring_words, two_springs_words
+from diagnosis.findings.spring_choices import choice_words
 from diagnosis.findings.terms import (
     BETWEEN_RUNS,
     CHANNELS,
@@ -79,7 +77,7 @@ def verdict(answer: Findings, rest: str) -> str:
         choice_words(answer.found.choices),
         hold_words(answer.found.hold),
         model_words(answer.model, answer),
-        *(RIVALS[rival.kind](rival.figures) for rival in found.rivals),
+        *(str(rival.figures["words"]) for rival in found.rivals),
     ]
     return " ".join(filter(None, parts))
 
@@ -167,12 +165,3 @@ def _with_second_modes(said_first: str, answer: Findings) -> list[str]:
     said = [second_mode_words(one, answer.misfit.unit) for one in modes]
     of_all = {one.run for one in modes} >= {run.id for run in answer.gap.runs}
     return [*said, said_first] if of_all else [said_first, *said]
-
-
-RIVALS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
-    "two springs off": two_springs_words,
-    "inertia by spring": inertia_by_spring_words,
-    "second inertia": second_inertia_words,
-    "stated": lambda found: str(found["words"]),
-}
-"""Sentences on a rival that is not an effect of the vocabulary, by kind."""

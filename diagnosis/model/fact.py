@@ -33,9 +33,13 @@ class Fact:
         return {"kind": data["kind"], "figures": {name: data[name] for name in data if name != "kind"}}
 
 
-def as_stated(words: str) -> Fact:
-    """A sentence from a nominal model or a rival, as a fact."""
-    return Fact("stated", {"words": words})
+def as_stated(words: str, kind: str = "stated", figures: Mapping[str, Any] = {}) -> Fact:
+    """A sentence from a nominal model or a rival, as a fact.
+
+    Args:
+        figures: the quantities in the sentence, as in `Fact`.
+    """
+    return Fact(kind, {**figures, "words": words})
 
 
 @dataclass(frozen=True)

@@ -147,7 +147,7 @@ def likeliest_lead(study: Study) -> float:
     """The lead with the least residual for the answer's effects, without a delay, s of the measured campaign.
 
     Returns:
-        0 where it is not determined, there is no gap, or the runs have no input.
+        0 where it is not determined, there is no gap, the runs have no input, or a rival explains as much without.
     """
     from scipy.special import chdtri  # imported here because it is slow to load
 
@@ -163,6 +163,8 @@ def likeliest_lead(study: Study) -> float:
         if fitted is None:
             return 0.0
         totals.append(fitted.total)
+    if min((one.best.fit.total for one in study.rivals), default=np.inf) <= min(totals):
+        return 0.0
     curve = np.polyfit(leads, totals, 2)
     best = float(leads[np.argmin(totals)])
     if curve[0] > 0.0:

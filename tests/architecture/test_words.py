@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from diagnosis.findings import cautions, place, verdict
+from diagnosis.findings import cautions, place
 
 ROOT = Path(__file__).parents[2] / "diagnosis"
 CALLS = ("TunnelError", "Remark")
@@ -49,10 +49,10 @@ def sentences(source: str) -> list[str]:
 def modules() -> list[Path]:
     """The modules outside the rooms that hold sentences.
 
-    Those are the findings, the settings, whose origins are a page, and the nominal models, each of which brings
-    what is said of it alone in its one file.
+    Those are the findings, the settings, whose origins are a page, and the nominal models and the rivals, each of
+    which brings what is said of it alone in its one file.
     """
-    rooms = {"findings", "settings", "model"}
+    rooms = {"findings", "settings", "model", "rivals"}
     return [path for path in sorted(ROOT.rglob("*.py")) if rooms.isdisjoint(path.relative_to(ROOT).parts)]
 
 
@@ -87,7 +87,7 @@ def test_a_sentence_is_told_from_other_text(source: str, count: int) -> None:
 
 def test_every_kind_of_fact_has_a_sentence_and_every_sentence_a_fact() -> None:
     known = {
-        *cautions.CAUTIONS, *cautions.NOISE, *cautions.REMARKS, *cautions.PATCH, *verdict.RIVALS, *place.REASONS,
+        *cautions.CAUTIONS, *cautions.NOISE, *cautions.REMARKS, *cautions.PATCH, *place.REASONS,
     }  # fmt: skip
     used, texts = set(), set()
     told = [path for path in ROOT.rglob("*.py") if "Fact(" in path.read_text("utf-8") or path in modules()]

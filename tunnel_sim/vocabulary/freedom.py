@@ -122,7 +122,8 @@ class Freedom:
 
     def _own(self, value: Any, name: str, owner: str, names: frozenset[str]) -> Any:
         if name in _KEPT:
-            return value
+            told = name == "figures" and "words" in value
+            return {**value, "words": self.words(value["words"], names)} if told else value
         if isinstance(value, str):
             if "unit" in (name, owner):
                 return "1/s" if owner in _FREQUENCIES else self.unit(value)

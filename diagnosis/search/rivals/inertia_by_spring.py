@@ -7,22 +7,23 @@ decay. So the decay, and runs with the wind off and on, tell the two apart.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, try_fit
 from diagnosis.likelihood.residuals import CHANNELS
-from diagnosis.model.fact import Fact
+from diagnosis.model.fact import Fact, as_stated
 from diagnosis.model.parameters import Point
 from diagnosis.model.similarity import Similarity
 from diagnosis.search.hypothesis import Hypothesis, restricted
 from diagnosis.search.rivals.rival import Rival, explains_all, explains_more
 from diagnosis.search.rivals.two_springs import ONE_SPRING, SpringError, differs_by_spring
 from diagnosis.search.scatter import without_deviations
+from identification.show.numbers import for_people, listed, plain
 from tunnel_sim.effects.base import Drawn
 from tunnel_sim.physics.run_settings import SettingsTable
 
@@ -113,7 +114,21 @@ class InertiaBySpring(Rival):
             for spring, name in zip(springs[1:], own, strict=True)
         ]
         beside = [name for name in best.names if name not in own]
-        return Fact("inertia by spring", {"springs": [asdict(one) for one in each], "beside": beside})
+        figures = {"springs": [asdict(one) for one in each], "beside": beside}
+        return as_stated(_words(figures), "inertia by spring", figures)
+
+
+def _words(found: Mapping[str, Any]) -> str:
+    """An inertia that differs from spring to spring and would explain the gap."""
+    beside = f" beside {plain(*found['beside'])}" if found["beside"] else ""
+    each = [
+        f"{for_people(100.0 * one.error, 100.0 * one.std, '%')} with the spring of {one.stiffness:g} N m/rad"
+        for one in (SpringError(**given) for given in found["springs"])
+    ]
+    return (
+        f"An inertia that differs from spring to spring would explain the gap{beside}: {listed(each)}, against the "
+        "softest spring. Weigh the adapters and clamps of the springs."
+    )
 
 
 def _with_inertias(base: Hypothesis) -> Hypothesis | None:

@@ -8,22 +8,23 @@ The moments of the mechanism, such as friction, act at the end with the sensor.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import hypot, pi, sqrt
-from typing import ClassVar, Final, Self
+from typing import Any, ClassVar, Final, Self
 
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, scaled_residuals, try_fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import project_out
-from diagnosis.model.fact import Fact
+from diagnosis.model.fact import Fact, as_stated
 from diagnosis.model.parameters import Point
 from diagnosis.model.run_data import RunData
 from diagnosis.model.similarity import Similarity
 from diagnosis.search.hypothesis import Hypothesis, restricted
 from diagnosis.search.rivals.rival import Rival, explains_all, explains_more
+from identification.show.numbers import for_people, plain
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.base import Drawn
 from tunnel_sim.effects.parameters import parameter
@@ -182,7 +183,31 @@ class TwoInertias(Rival):
             below = 1.0 / sqrt(1.0 + ratio)
             slope = np.array([below, 0.0, -0.5 * omega * below**3])
             figures |= {"antiresonance": hertz(omega * below, slope), "ratio": {"value": ratio, "std": std}}
-        return Fact("second inertia", figures)
+        return as_stated(_words(figures), "second inertia", figures)
+
+
+def _words(found: Mapping[str, Any]) -> str:
+    """A second inertia that would explain the gap, the frequencies that show it, and where the sensor is."""
+    beside = f" beside {plain(*found['beside'])}" if found["beside"] else ""
+    first = (
+        "A second inertia behind a spring, between motor and link, would explain the gap"
+        f"{beside}; it is not in the vocabulary. From moment to angle there is "
+    )
+    resonance = f"a resonance at {_hertz(found['resonance'])}"
+    if "ratio" not in found:
+        return (
+            f"{first}{resonance} without an antiresonance: the angle is measured at the link. A resonance of the "
+            "actuator or the sensor would look alike. Measure the angle at the motor, too."
+        )
+    ratio = for_people(found["ratio"]["value"], found["ratio"]["std"], "1")
+    return (
+        f"{first}an antiresonance at {_hertz(found['antiresonance'])} and {resonance}: the angle is measured at "
+        f"the motor, and the link's inertia is {ratio} times the motor's. Lock the link, or measure its angle, too."
+    )
+
+
+def _hertz(found: Mapping[str, float]) -> str:
+    return for_people(found["frequency_hz"], found["std_hz"], "Hz")
 
 
 def _bearable(problem: Problem) -> bool:

@@ -8,18 +8,19 @@ probability is added to the probability of an unknown cause.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, try_fit
-from diagnosis.model.fact import Fact
+from diagnosis.model.fact import Fact, as_stated
 from diagnosis.model.similarity import Similarity
 from diagnosis.search.hypothesis import Hypothesis, restricted
 from diagnosis.search.one_more import sets_with_one_more
 from diagnosis.search.rivals.rival import Rival
+from identification.show.numbers import for_people, plain
 from tunnel_sim.effects import ALL_EFFECTS, Effect
 
 TWO_SPRINGS_OF: Final = 3
@@ -42,6 +43,13 @@ class SpringError:
     error: float
     std: float
     probability: float | None = None
+
+    @property
+    def words(self) -> str:
+        """Such as ``16.12 N m/rad is 1.96 % softer than stated``."""
+        size = for_people(100.0 * abs(self.error), 100.0 * self.std, "%")
+        side = "stiffer" if self.error > 0.0 else "softer"
+        return f"{self.stiffness:g} N m/rad is {size} {side} than stated"
 
 
 (ONE_SPRING,) = (kind for kind in ALL_EFFECTS if kind.chosen_spring() is not None)
@@ -90,7 +98,18 @@ class TwoSprings(Rival):
         both = (ONE_SPRING.name, AnotherSpring.name)
         springs = [asdict(spring_error(best.fit, name, similarity)) for name in both]
         beside = [name for name in best.names if name not in both]
-        return Fact("two springs off", {"springs": springs, "beside": beside})
+        figures = {"springs": springs, "beside": beside}
+        return as_stated(_words(figures), "two springs off", figures)
+
+
+def _words(found: Mapping[str, Any]) -> str:
+    """Springs that would explain the gap together."""
+    beside = f" beside {plain(*found['beside'])}" if found["beside"] else ""
+    springs = " and ".join(SpringError(**one).words for one in found["springs"])
+    return (
+        f"Two springs that are not as stiff as stated would explain the gap{beside}: for example, "
+        f"{springs}. Measure their stiffness again."
+    )
 
 
 def spring_error(fit: Fit, name: str, similarity: Similarity) -> SpringError:

@@ -304,7 +304,10 @@ def test_a_contact_that_yields_and_differs_by_direction_is_not_decided_as_anothe
 def test_friction_that_differs_between_drive_and_back_drive_is_not_decided_as_another_cause(
     tmp_path: Path, seed: int, share: float, back: float, kinds: tuple[str, ...] | None
 ) -> None:
-    """No law of the vocabulary is this one: sets that fit 96 to 99 % move MuJoCo's joint unlike the records."""
+    """No law of the vocabulary is this one: sets that fit 96 to 99 % move MuJoCo's joint unlike the records.
+
+    Where no other effect is tried, the friction is said with its sizes (MuJoCo's friction is a soft constraint).
+    """
     joint = f'{TRUE} frictionloss="0.1" solreffriction="0.002 1"'
     data = campaign_of(robot(joint, axis=LEVEL, tip=0.2), driven=True, seed=seed, share=share, back=back)
     model = own_model(tmp_path, data, robot(TRUE, axis=LEVEL, tip=0.2))
