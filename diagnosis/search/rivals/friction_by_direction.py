@@ -28,7 +28,7 @@ from diagnosis.model.parameters import Point
 from diagnosis.model.similarity import Similarity
 from diagnosis.search.hypothesis import Hypothesis, restricted
 from diagnosis.search.rivals.rival import Rival, explains_all, explains_more
-from identification.show.numbers import for_people, percent, plain
+from identification.show.numbers import percent, plain, with_std
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.base import Drawn
 from tunnel_sim.effects.capabilities import Friction
@@ -212,13 +212,12 @@ def _words(found: Mapping[str, Any]) -> str:
 
 
 def _sizes(found: Mapping[str, Any], quadrant: str) -> str:
-    moment = for_people(found["moment"][quadrant]["value"], found["moment"][quadrant]["std"], "N m")
+    one = found["moment"][quadrant]
+    moment = f"{with_std(one['value'], one['std'])} N m"
     if "share" not in found:
         return moment
     share = found["share"][quadrant]
-    return (
-        f"{moment} and {for_people(100.0 * share['value'], 100.0 * share['std'], '%')} of the moment carried"
-    )
+    return f"{moment} and {with_std(100.0 * share['value'], 100.0 * share['std'])} % of the moment carried"
 
 
 def _inexact(fitted: Fit) -> dict[str, float]:

@@ -20,6 +20,7 @@ from diagnosis.model.joint import with_law
 from diagnosis.model.parameters import Point
 from diagnosis.model.similar import similar_campaign
 from diagnosis.patch.native_friction import Carried, native_friction
+from diagnosis.result import Diagnosis
 from diagnosis.search import hypothesis
 from diagnosis.search.hypothesis import Hypothesis, _choices, with_forms
 from diagnosis.settings import Settings
@@ -277,11 +278,21 @@ def test_load_and_presliding_act_together(tmp_path: Path, driven: bool, seed: in
     assert answer.model.closed > 0.999
 
 
+def differs(answer: Diagnosis, share: float, back: float) -> bool:
+    """Whether the shares in drive and in back-drive are said: MuJoCo's friction is a soft constraint."""
+    found = [fact.figures["share"] for fact in answer.found.rivals if fact.kind == "friction by direction"]
+    truth = {"drive": share, "back_drive": back}
+    return bool(found) and all(
+        abs(found[0][quadrant]["value"] - true) < 4.0 * found[0][quadrant]["std"] + 0.01 * true
+        for quadrant, true in truth.items()
+    )
+
+
 @pytest.mark.parametrize(
     ("seed", "share", "back", "moves"),
     [slow(20, 0.08, 0.12, yielding), slow(21, 0.05, 0.25, yielding), slow(22, 0.08, 0.12, yielding)],
 )
-def test_a_contact_that_yields_and_differs_by_direction_is_not_decided_as_another_cause(
+def test_a_contact_that_yields_and_differs_by_direction_is_said_with_both_sizes(
     tmp_path: Path, seed: int, share: float, back: float, moves: Callable[..., Array]
 ) -> None:
     xml = robot(TRUE, axis=LEVEL, tip=0.2)
@@ -290,6 +301,7 @@ def test_a_contact_that_yields_and_differs_by_direction_is_not_decided_as_anothe
         data, kinds=vocabulary((*KINDS, "dropped_samples")), model=own_model(tmp_path, data, xml)
     )
     assert answer.causes == ("unknown",) or not answer.decision.decided
+    assert differs(answer, share, back)
 
 
 @pytest.mark.parametrize(
@@ -301,15 +313,14 @@ def test_a_contact_that_yields_and_differs_by_direction_is_not_decided_as_anothe
         slow(30, 0.05, 0.5, None),
     ],
 )
-def test_friction_that_differs_between_drive_and_back_drive_is_not_decided_as_another_cause(
+def test_friction_that_differs_between_drive_and_back_drive_is_said_with_both_sizes(
     tmp_path: Path, seed: int, share: float, back: float, kinds: tuple[str, ...] | None
 ) -> None:
-    """No law of the vocabulary is this one: sets that fit 96 to 99 % move MuJoCo's joint unlike the records.
-
-    Where no other effect is tried, the friction is said with its sizes (MuJoCo's friction is a soft constraint).
-    """
+    """No law of the vocabulary is this one: sets that fit 96 to 99 % move MuJoCo's joint unlike the records."""
     joint = f'{TRUE} frictionloss="0.1" solreffriction="0.002 1"'
     data = campaign_of(robot(joint, axis=LEVEL, tip=0.2), driven=True, seed=seed, share=share, back=back)
     model = own_model(tmp_path, data, robot(TRUE, axis=LEVEL, tip=0.2))
     answer = diagnose(data, kinds=None if kinds is None else vocabulary(kinds), model=model)
     assert answer.causes == ("unknown",) or not answer.decision.decided
+    # ten times as much is unknown, without sizes: the search for them ends beside them
+    assert back == 0.5 or differs(answer, share, back)
