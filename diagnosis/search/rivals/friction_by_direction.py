@@ -121,10 +121,8 @@ class DirectedFriction(Effect):
             course, effect = cls.courses.get(drive.values.tobytes()), effects[place]
             if course is None or effect.is_null:
                 continue
-            given, terms = (
-                drive.at(course.times),
-                ((runs[size][place], runs[rest][place]) for size, rest in WEIGHTS),
-            )
+            given = drive.at(course.times)
+            terms = ((runs[size][place], runs[rest][place]) for size, rest in WEIGHTS)
             weight = sum(size * np.sin(course.angle - rest) for size, rest in terms)
             load = np.maximum(np.abs(given), np.abs(weight))
             against = 0.5 * np.sign(given) * course.grip * (effect.moment + effect.share * load)
@@ -318,9 +316,8 @@ def _gripping(fitted: Fit, fine: int = _FINE) -> Fit:
         if again is None:
             break
         fitted, before = again, fitted
-        if (
-            abs(fitted.total - before.total) < _SETTLED * before.total
-        ):  # it need not fall: the contact changes
+        # χ² need not fall, because the contact changes
+        if abs(fitted.total - before.total) < _SETTLED * before.total:
             break
     return fitted
 
