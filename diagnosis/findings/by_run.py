@@ -17,12 +17,14 @@ from scipy.special import chdtrc
 
 from diagnosis.findings.finding import Answered, Finding, Judged, Picture
 from diagnosis.findings.units import own_parameters
-from diagnosis.likelihood.least_squares import Fit, scaled_residuals
+from diagnosis.likelihood.least_squares import Fit, fit_at, scaled_residuals
 from diagnosis.likelihood.normal_equations import Products, by_run
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.sensitivities import Jacobian, sensitivities
 from diagnosis.model.parameters import Point
+from diagnosis.search.process_noise import with_response
 from diagnosis.search.scatter import with_own_linear_terms
+from diagnosis.search.study import Study
 from identification.show.blocks import Detail, Paragraph, Section, TextTable
 from identification.show.drawing import AFTER, NARROW, NOISE, SOFT
 from identification.show.numbers import (
@@ -130,8 +132,9 @@ class CausesByRun(Finding):
         if not study.named or study.chosen is study.nominal:
             return None
 
-        units = _units(study.chosen)
-        free = {name: Quantity(study.chosen.value(name), None, units[name]) for name in units}
+        fit = in_its_noise(study)
+        units = _units(fit)
+        free = {name: Quantity(fit.value(name), None, units[name]) for name in units}
 
         def own(cause: SizeByRun, given: Quantity) -> Quantity:
             name = f"{cause.effect}.{cause.parameter}"  # the unit of the information depends on the exponents
@@ -145,7 +148,7 @@ class CausesByRun(Finding):
                 common=own(cause, cause.common),
                 runs={run: own(cause, of) for run, of in cause.runs.items()},
             )
-            for cause in sizes(study.chosen, study.prepared.kinds)
+            for cause in sizes(fit, study.prepared.kinds)
         )
         return cls(causes) if causes else None
 
@@ -194,6 +197,16 @@ def _units(fit: Fit) -> dict[str, str]:
     """Units of the fitted parameters of effects, by full name."""
     infos = {f"{kind.name}.{info.name}": info for kind in fit.problem.effects for info in kind.parameters()}
     return {name: infos[name].unit for name in fit.problem.names if name in infos}
+
+
+def in_its_noise(study: Study) -> Fit:
+    """The fit of the answer, with the response to its random moment in the noise of the runs.
+
+    This motion differs from run to run, so the sizes would differ by more than the errors of the sensor's noise.
+    """
+    fit = study.chosen
+    noisy = None if study.moment is None else with_response(fit, study.moment.process.spectrum)
+    return fit if noisy is None else fit_at(replace(fit.problem, data=noisy), fit.point)
 
 
 def sizes(fit: Fit, kinds: Sequence[type[Effect]]) -> Iterator[SizeByRun]:
