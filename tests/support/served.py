@@ -30,6 +30,25 @@ SETTLED = """() => {
 }"""
 """Whether nothing has been added to the page for 0.3 s, and no colour is on its way to another."""
 
+FULL_DISK = """
+import errno, os, tempfile
+from tunnel_sim.files import writing
+
+def fail(*_):
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "/tmp/secret-name")
+
+write = writing._write_to
+
+def write_until_full(descriptor, content):
+    write(descriptor, content[:3] if content.startswith(b"full") else content)
+    if content.startswith(b"full"):
+        fail()
+
+writing._write_to = write_until_full
+tempfile.SpooledTemporaryFile.rollover = fail
+"""
+"""A disk that is full as soon as a file begins with ``full``, or is too large for the memory."""
+
 
 @dataclass(frozen=True)
 class Bench:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import http.client
 import shutil
-from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,11 +16,9 @@ import pytest
 from tests.support.browser import CONTRASTS, IN_A_BROWSER, LEAST_CONTRAST
 from tests.support.diagnosis_document import campaign, document
 from tests.support.import_files import decay
-from tests.support.served import SETTLED, Bench, bench, tab
-from tests.unit.tunnel_lab.bench.test_refusals import FULL_DISK
+from tests.support.served import SETTLED, Bench, tab
 from tunnel_lab.bench.workspace import Session
 from tunnel_lab.terminal.arguments import file_hashes
-from tunnel_sim.files import import_records
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.files.importing.choices import read_recipe
 from tunnel_sim.files.reading import read_json
@@ -35,17 +32,6 @@ TWO_CHANNELS = Path(__file__).parents[4] / "docs" / "how-to" / "data" / "Measure
 def log_text(seed: int = 1) -> str:
     rows = [f"{t:.3f},{y:.6f}" for t, y in zip(*decay(seed), strict=True)]
     return "time_s,yaw_rad\n" + "\n".join(rows)
-
-
-@pytest.fixture(scope="module")
-def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
-    """A workspace with a campaign of two runs that has been diagnosed."""
-    folder = tmp_path_factory.mktemp("workspace")
-    for name in ("a", "b"):
-        (folder / f"{name}.csv").write_text(log_text())
-    import_records([folder / "a.csv", folder / "b.csv"], folder / "two")
-    with bench(folder) as found:
-        yield found
 
 
 def test_dropped_files_are_read_marked_and_written(browser: Any, served: Bench, tmp_path: Path) -> None:
@@ -252,14 +238,15 @@ def test_a_refusal_can_be_read_at_every_width(browser: Any, served: Bench) -> No
         one.complaints.clear()
 
 
-def test_a_full_disk_is_said_beside_the_drop_zone(browser: Any, tmp_path: Path) -> None:
+def test_a_full_disk_is_said_beside_the_drop_zone(browser: Any, served: Bench, tmp_path: Path) -> None:
     (tmp_path / "full.csv").write_text("full")
-    with bench(tmp_path / "work", prelude=FULL_DISK) as served, tab(browser, served) as one:
+    before = sorted(served.folder.iterdir())
+    with tab(browser, served) as one:
         one.page.set_input_files("input[type=file]", [str(tmp_path / "full.csv")])
         one.page.wait_for_selector(".fault:has-text('The disk is full: nothing was kept.')")
         assert [words for words in one.complaints if "507" not in words] == []
         one.complaints.clear()
-        assert list(served.folder.iterdir()) == []
+        assert sorted(served.folder.iterdir()) == before
 
 
 @pytest.mark.parametrize("headers", [{}, {"Origin": "http://evil.example"}, {"Host": "evil.example"}])

@@ -6,7 +6,6 @@ Truth: files written here, of known angles, conditions and releases.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,19 +15,13 @@ import scipy.io
 
 from tests.support.browser import IN_A_BROWSER, screenshot
 from tests.support.import_files import decay
-from tests.support.served import Bench, Tab, bench, tab
+from tests.support.served import Bench, Tab, tab
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.files.importing.choices import read_recipe
 
 pytestmark = IN_A_BROWSER
 PICTURES = os.environ.get("BENCH_PICTURES")
-
-
-@pytest.fixture(scope="module")
-def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
-    with bench(tmp_path_factory.mktemp("messy")) as found:
-        yield found
 
 
 def dropped(one: Tab, *paths: Path) -> None:

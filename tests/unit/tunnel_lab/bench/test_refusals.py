@@ -8,55 +8,17 @@ from __future__ import annotations
 
 import http.client
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import pytest
 
 from tests.support.import_files import decay
-from tests.support.served import Bench, bench
+from tests.support.served import Bench
 from tunnel_lab.bench.workspace import Session
-from tunnel_sim.files import import_records
 
 ROWS = "\n".join(f"{t:.3f},{y:.6f}" for t, y in zip(*decay(1), strict=True))
 LOG = f"time_s,yaw_rad\n{ROWS}\n".encode()
-FULL_DISK = """
-import errno, os, tempfile
-from tunnel_sim.files import writing
-
-def fail(*_):
-    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "/tmp/secret-name")
-
-write = writing._write_to
-
-def write_until_full(descriptor, content):
-    write(descriptor, content[:3] if content.startswith(b"full") else content)
-    if content.startswith(b"full"):
-        fail()
-
-writing._write_to = write_until_full
-tempfile.SpooledTemporaryFile.rollover = fail
-"""
-
-
-@pytest.fixture(scope="module")
-def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
-    """A workspace with a campaign that has not been diagnosed, and one whose diagnosis is not one."""
-    folder = tmp_path_factory.mktemp("workspace")
-    (folder / "a.csv").write_bytes(LOG)
-    for name in ("two", "odd"):
-        import_records([folder / "a.csv"], folder / name)
-    (folder / "odd.diagnosis.json").write_text('{"verdict": 1, "provenance": []}')
-    with bench(folder) as found:
-        yield found
-
-
-@pytest.fixture(scope="module")
-def full(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
-    """A bench whose disk is full as soon as a file begins with ``full``, or is too large for the memory."""
-    with bench(tmp_path_factory.mktemp("full"), prelude=FULL_DISK) as found:
-        yield found
 
 
 def asked(
@@ -102,9 +64,9 @@ def upload(
         ("/%ff%00%0a/report.html", 404, "there is no campaign"),
         ("/%2e%2e/report.html", 404, "there is no campaign"),
         ("/<script>/report.html", 404, "&lt;script&gt;"),
-        ("/two/report.html", 409, "Identify the campaign"),
-        ("/two/fit.html", 409, "Diagnose the campaign first."),
-        ("/two/report", 409, "Identify the campaign"),
+        ("/bare/report.html", 409, "Identify the campaign"),
+        ("/bare/fit.html", 409, "Diagnose the campaign first."),
+        ("/bare/report", 409, "Identify the campaign"),
         ("/odd/fit.html", 409, "odd.diagnosis.json"),
     ],
 )
@@ -187,24 +149,25 @@ def test_a_form_without_a_file_is_refused(served: Bench) -> None:
 
 
 @pytest.mark.parametrize("content", [b"full at the second file", b"1" * 3_000_000])
-def test_a_full_disk_is_said_and_nothing_is_half_kept(full: Bench, content: bytes) -> None:
-    status, words = upload(full, [(b"first.csv", LOG), (b"second.csv", content)])
+def test_a_full_disk_is_said_and_nothing_is_half_kept(served: Bench, content: bytes) -> None:
+    before = sorted(served.folder.iterdir())
+    status, words = upload(served, [(b"first.csv", LOG), (b"second.csv", content)])
     assert (status, words) == (507, "The disk is full: nothing was kept. Free some space, and try again.\n")
-    assert list(full.folder.iterdir()) == []
+    assert sorted(served.folder.iterdir()) == before
 
 
-def test_a_full_disk_leaves_the_files_kept_before(full: Bench) -> None:
-    assert upload(full, [(b"before.csv", LOG)])[0] == 200
-    assert upload(full, [(b"before.csv", b"new"), (b"full.csv", b"full")], "/before/upload")[0] == 507
-    (kept,) = Session(full.folder, "before").uploads.iterdir()
+def test_a_full_disk_leaves_the_files_kept_before(served: Bench) -> None:
+    assert upload(served, [(b"before.csv", LOG)])[0] == 200
+    assert upload(served, [(b"before.csv", b"new"), (b"full.csv", b"full")], "/before/upload")[0] == 507
+    (kept,) = Session(served.folder, "before").uploads.iterdir()
     assert kept.read_bytes() == LOG
-    kept.unlink()
-    kept.parent.rmdir()
 
 
-def test_a_workspace_that_is_gone_is_said(tmp_path: Path) -> None:
-    with bench(tmp_path / "work") as served:
-        served.folder.rmdir()
+def test_a_workspace_that_is_gone_is_said(served: Bench) -> None:
+    elsewhere = served.folder.rename(served.folder.with_name("elsewhere"))
+    try:
         status, page = asked(served, "/")
         assert (status, "the folder cannot be read" in page) == (409, True)
         assert upload(served, [(b"a.csv", LOG)])[0] == 409
+    finally:
+        elsewhere.rename(served.folder)
