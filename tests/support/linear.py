@@ -58,7 +58,9 @@ def linear_campaign(
 
         for release in releases:
             ends = (0.0, float(time[-1]))
-            found = solve_ivp(slope, ends, [release, 0.0], t_eval=time, rtol=1e-9, atol=1e-12 * release)
+            found = solve_ivp(
+                slope, ends, [release, 0.0], t_eval=time, method="LSODA", rtol=1e-9, atol=1e-12 * release
+            )
             acceleration = np.array([slope(0.0, state)[1] for state in found.y.T])
             reading = {"angle": found.y[0], "rate": found.y[1], "acceleration": acceleration}[quantity]
             reading = reading + noise * np.abs(reading).max() * rng.standard_normal(reading.size)

@@ -11,19 +11,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis import diagnose
+from diagnosis import diagnose, vocabulary
 from diagnosis.findings.closing import closed_study
 from diagnosis.likelihood.starting_points import loses_phase
 from diagnosis.result import Diagnosis
 from diagnosis.search.investigate import investigate
 from tests.support.gap_campaigns import CN_BETA, CN_R, campaign, nominal
-from tunnel_sim.effects import Effect, effect_class, effect_from
+from tunnel_sim.effects import Effect, effect_from
 from tunnel_sim.vocabulary.between_runs import Repeatability
 from tunnel_sim.vocabulary.campaign import Campaign
 
 STATED = tuple((spring, speed) for spring in (16.12, 21.02, 44.84) for speed in (0.0, 13.9, 19.4))
 SOFT, BY = 44.84, 0.03
 WIND, SPRING = 0.003, 0.0005
+CAUSES = vocabulary(
+    ("coulomb_friction", "spring_miscalibration", "wind_speed_scatter", "stiffness_scatter")
+)
+KINDS = (*CAUSES, *vocabulary(("cubic_stiffness", "wind_speed_offset")))
 
 
 def differing(seed: int, *effects: Effect, by: float = BY, stated: bool = False) -> Campaign:
@@ -53,7 +57,7 @@ def assert_right(answer: Diagnosis) -> None:
 @pytest.fixture(scope="module")
 def answer() -> Diagnosis:
     """The answer where nothing is stated."""
-    return diagnose(differing(7))
+    return diagnose(differing(7), kinds=KINDS)
 
 
 def test_differences_are_told_from_effects_after_stretches(answer: Diagnosis) -> None:
@@ -66,7 +70,7 @@ def test_differences_are_told_from_effects_after_stretches(answer: Diagnosis) ->
 
 
 def test_stated_differences_do_not_absorb_the_gap(answer: Diagnosis) -> None:
-    stated = diagnose(differing(7, stated=True))
+    stated = diagnose(differing(7, stated=True), kinds=KINDS)
     assert stated.causes == ("spring_miscalibration",)
     assert stated.decided
     assert stated.gap.closed > 0.99
@@ -80,9 +84,7 @@ def test_the_gap_is_of_runs_that_repeat_only_where_stated_differences_absorb_it(
 ) -> None:
     """Differences as stated are no gap: a small cause beside them is not credited with them."""
     friction = effect_from("coulomb_friction", {"friction_moment": 0.0005})
-    names = ("coulomb_friction", "spring_miscalibration", "wind_speed_scatter", "stiffness_scatter")
-    kinds = [effect_class(name) for name in names]
-    study = investigate(differing(7, friction, by=by, stated=True), kinds)
+    study = investigate(differing(7, friction, by=by, stated=True), CAUSES)
     assert "coulomb_friction" in study.causes
     assert study.nominal.problem.scatter
     assert (closed_study(study) is not study) == absorbed
