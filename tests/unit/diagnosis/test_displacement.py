@@ -22,6 +22,7 @@ from diagnosis.model.carriage import Carriage
 from diagnosis.result import Diagnosis
 from identification import identify
 from identification.show.blocks import as_html
+from tests.marks import slow
 from tests.support.linear import FORBIDDEN, Force, linear_campaign, no_force
 from tunnel_lab.commands.about import schema_of
 from tunnel_lab.report import render_report
@@ -189,7 +190,7 @@ def scaled(campaign: Campaign, factor: float) -> Campaign:
     return replace(campaign, runs=tuple(runs))
 
 
-@pytest.mark.parametrize("quantity", ["angle", "rate"])
+@pytest.mark.parametrize("quantity", [slow("angle"), "rate"])
 def test_an_angle_and_its_twin_have_the_same_numbers(quantity: Quantity) -> None:
     """Bit for bit, with other units; where the motion has the size of a rig's angle."""
     displaced = linear_campaign(2.0, (3.0, 5.0), (0.3, 0.15), square, quantity=quantity)

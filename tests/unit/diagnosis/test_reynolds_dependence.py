@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from diagnosis import diagnose
+from diagnosis.search.investigate import investigate
 from tests.support.acting import acting
 from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.effects.parameters import Circumstances, WindOnRun
@@ -46,8 +47,8 @@ def test_three_speeds_name_it_with_its_size_and_with_cn_beta_at_the_mean_speed()
 
 
 def test_three_speeds_tell_it_from_an_offset_of_the_speed():
-    found = answer((0.0, 12.0, 18.0, 25.0), "wind_speed_offset", offset=0.3)
-    assert found.causes == ("wind_speed_offset",)
+    data = simulate_campaign(plan((0.0, 12.0, 18.0, 25.0), "wind_speed_offset", offset=0.3))
+    assert investigate(data, KINDS).causes == ("wind_speed_offset",)
 
 
 def test_two_speeds_are_said_to_tell_them_apart_by_the_damping_alone():

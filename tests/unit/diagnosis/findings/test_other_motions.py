@@ -88,10 +88,11 @@ def test_a_second_mode_is_said_only_where_it_may_be_named():
 
 LARGER = (0.114, 2.844, 0.93)  # than the motion at the release, and decaying faster
 SWING = (0.079, 2.232, 0.24)
+MODES = [effect_class(name) for name in ("second_mode", "cubic_stiffness", "coulomb_friction")]
 
 
 def test_a_mode_near_the_motion_is_named_where_the_motion_is_lost():
-    answer = diagnose(campaign(SWING, LARGER, seconds=9.0))
+    answer = diagnose(campaign(SWING, LARGER, seconds=9.0), kinds=MODES)
     assert answer.causes == ("second_mode",)
     size = answer.candidates[0].parameters["amplitude"]
     assert size.value == pytest.approx(LARGER[0], abs=4.0 * size.std)
@@ -99,7 +100,7 @@ def test_a_mode_near_the_motion_is_named_where_the_motion_is_lost():
 
 
 def test_a_second_mode_is_said_where_a_third_hides_it():
-    answer = diagnose(campaign(SWING, LARGER, (0.06, 3.7, 0.3), seconds=9.0))
+    answer = diagnose(campaign(SWING, LARGER, (0.06, 3.7, 0.3), seconds=9.0), kinds=MODES)
     assert answer.causes == ("unknown",)
     assert "contains a second mode" in answer.verdict
 
@@ -127,8 +128,7 @@ def two_modes(derivative, share):
     "share", [0.05, 0.5]
 )  # with the larger one the nominal model misses the motion itself
 def test_a_second_mode_is_an_answer_however_large_and_whatever_the_sensor_measures(derivative, share):
-    kinds = [effect_class(name) for name in ("second_mode", "cubic_stiffness", "coulomb_friction")]
-    study = investigate(two_modes(derivative, share), kinds)
+    study = investigate(two_modes(derivative, share), MODES)
     assert misses_motion(study.nominal) == (share > 0.1)
     assert study.fitted == ("second_mode",)
     assert study.answers[0].probability > 0.9

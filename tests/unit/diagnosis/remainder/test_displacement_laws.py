@@ -15,6 +15,7 @@ import pytest
 from diagnosis import diagnose
 from diagnosis.remainder.formula import Formula, FormulaTerm, effect_table
 from diagnosis.result import Diagnosis
+from tests.marks import slow
 from tests.support.linear import FORBIDDEN, linear_campaign
 from tunnel_lab.commands.diagnose import write_proposal
 from tunnel_sim.effects.expression_effect import read_effects
@@ -62,7 +63,7 @@ def file_of(folder: Path, width: float) -> Path:
     return path
 
 
-@pytest.fixture(scope="module", params=[0.15, 3e-4], ids=["a cart", "a stage"])
+@pytest.fixture(scope="module", params=[slow(0.15), 3e-4], ids=["a cart", "a stage"])
 def found(request: pytest.FixtureRequest) -> tuple[Diagnosis, Campaign, float]:
     """A diagnosis that may name dry friction only."""
     campaign, width = notched(request.param)

@@ -29,7 +29,7 @@ def decays(
     rng, runs = np.random.default_rng(4), list[Run]()
     time = INTERVAL * np.arange(2500)
     for spring, error in inertias.items():
-        for speed in (0.0, 15.0, 25.0):
+        for speed in (0.0, 20.0):
             pressure = 0.5 * DENSITY * speed * AREA * LENGTH
             inertia = INERTIA * (1.0 + error)
             held = spring * (1.0 + stiffness.get(spring, 0.0) + scatter * rng.standard_normal())

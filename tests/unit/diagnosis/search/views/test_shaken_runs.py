@@ -27,7 +27,7 @@ def shaken(*names: str) -> Campaign:
     for kind in map(effect_class, names):
         parameters = (one.name for one in kind.parameters())
         effects.append(EffectSetting(kind.name, dict(zip(parameters, kind.example, strict=False))))
-    conditions = (Condition(f"r{i}", k, v, 1.2, 0.35, 10.0) for i, (k, v) in enumerate(CONDITIONS, 1))
+    conditions = (Condition(f"r{i}", k, v, 1.2, 0.35, 10.0) for i, (k, v) in enumerate(CONDITIONS[::2], 1))
     truth = Truth(CN_BETA, CN_R, INERTIA, DAMPING)
     sensor = SensorModel(250.0, zero=0.002)
     return simulate_campaign(
