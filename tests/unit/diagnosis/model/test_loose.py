@@ -89,7 +89,7 @@ def within(found: Diagnosis, stds: float) -> bool:
 
 
 def test_dry_friction_is_named_and_what_vanishes_without_a_spring_is_said() -> None:
-    found = diagnose(campaign(joint(FRICTION, 2)))
+    found = diagnose(campaign(joint(FRICTION, 2)), rivals=())
     assert found.causes == ("coulomb_friction",)
     friction = found.candidates[0].parameters["friction_moment"]
     assert friction.std is not None

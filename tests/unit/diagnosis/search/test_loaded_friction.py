@@ -250,7 +250,7 @@ def test_a_joint_that_carries_a_load_is_diagnosed_and_patched(tmp_path: Path, dr
     )
     data = campaign_of(xml, driven=driven)
     model = own_model(tmp_path, data, robot(TRUE, axis=LEVEL, actuators=actuators, tip=0.2))
-    answer = diagnose(data, kinds=vocabulary(KINDS), model=model)
+    answer = diagnose(data, kinds=vocabulary(KINDS), model=model, rivals=())
     assert answer.causes == ("coulomb_friction",)
     assert near(answer, "load", SHARE)
     assert near(answer, "friction_moment", SLIDING, 0.01)

@@ -9,6 +9,7 @@ import pytest
 
 from identification.examination.examine import examine
 from identification.examination.slips.odd_sensors import odd_gains
+from tests.marks import slow
 from tests.support.slip_cases import RELEASED
 from tests.support.slip_rig import clocking, reading, scaling, sensing
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -65,9 +66,9 @@ def test_uneven_times_do_not_hide_a_gain():
     assert _named(reading(lambda yaw: 1.4 * yaw, "r5")(jittered))
 
 
-@pytest.mark.parametrize("release", [0.002, 0.03, 0.1])
-@pytest.mark.parametrize("scatter", [0.0, 0.02, 0.2])
-@pytest.mark.parametrize("runs", [5, 8, 12])
+@pytest.mark.parametrize("release", [0.002, slow(0.03), 0.1])
+@pytest.mark.parametrize("scatter", [0.0, slow(0.02), 0.2])
+@pytest.mark.parametrize("runs", [5, slow(8), 12])
 @pytest.mark.parametrize("wrong", [0.0, 0.3], ids=["honest", "one release wrong"])
 def test_false_alarms_are_rarer_than_stated(release: float, scatter: float, runs: int, wrong: float):
     """At most one campaign in a hundred beside one release from a wrong angle, and one in a thousand else."""

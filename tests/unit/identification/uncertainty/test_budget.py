@@ -12,6 +12,7 @@ from tests.marks import slow
 from tests.reference.free_decays import TWELVE, Setting, campaign, with_records
 from tunnel_sim.vocabulary.record import Record
 
+pytestmark = pytest.mark.usefixtures("unexamined")
 EIGHT = (
     *(Setting(spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 12.0, 24.0)),
     Setting(16.12, 0.0, 0.2),

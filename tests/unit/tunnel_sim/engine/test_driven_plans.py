@@ -74,7 +74,7 @@ def test_no_cause_is_named_where_there_is_none(tmp_path: Path) -> None:
 
 def test_dry_friction_is_named(tmp_path: Path) -> None:
     plan = with_effect(planned(tmp_path, MULTISINE), "coulomb_friction", friction_moment=0.004)
-    found = diagnose(simulate_campaign(plan), kinds=KINDS)
+    found = diagnose(simulate_campaign(plan), kinds=KINDS, rivals=())
     assert found.causes == ("coulomb_friction",)
     assert found.gap.closed > 0.99
 

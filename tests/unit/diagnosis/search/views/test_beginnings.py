@@ -38,7 +38,7 @@ def study(share: float, names: tuple[str, ...], lost: bool = False) -> Study:
     count = 2 * (COUNT_LOST if lost else COUNT)
     settings = cut_to(round(share * count))
     kinds = [effect_class(name) for name in names]
-    return investigate(data, kinds, settings=settings, views=VIEWS)
+    return investigate(data, kinds, settings=settings, views=VIEWS, rivals=())
 
 
 def lengths(found: Study, *names: str) -> list[int]:
@@ -104,9 +104,9 @@ def test_what_acts_later_on_is_found_beside_what_acts_from_the_beginning() -> No
     data = replace(driven("moment", SPRING), runs=tuple(runs))
     kinds = [effect_class(name) for name in ("cubic_stiffness", "dropped_samples", "coulomb_friction")]
     settings = cut_to(COUNT)
-    in_beginnings = investigate(data, kinds, settings=settings, views=(Beginnings,))
+    in_beginnings = investigate(data, kinds, settings=settings, views=(Beginnings,), rivals=())
     assert in_beginnings.causes == ("cubic_stiffness",)
-    found = investigate(data, kinds, settings=settings, views=VIEWS)
+    found = investigate(data, kinds, settings=settings, views=VIEWS, rivals=())
     assert found.causes == ("cubic_stiffness", "dropped_samples")
 
 
@@ -120,7 +120,7 @@ def test_whole_runs_decide_where_the_runs_differ_by_chance() -> None:
     data = replace(driven("moment", SPRING), runs=tuple(runs))
     kinds = [effect_class(name) for name in ("cubic_stiffness", "coulomb_friction", "stiffness_scatter")]
     settings = cut_to(3 * COUNT)
-    found = investigate(data, kinds, settings=settings, views=VIEWS)
+    found = investigate(data, kinds, settings=settings, views=VIEWS, rivals=())
     assert found.causes == ("cubic_stiffness", "stiffness_scatter")
     assert lengths(found, "coulomb_friction") == [run.reading.size for run in found.nominal.problem.data.runs]
 
