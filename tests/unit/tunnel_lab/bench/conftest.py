@@ -19,7 +19,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
     rows = "\n".join(f"{t:.3f},{y:.6f}" for t, y in zip(*decay(1), strict=True))
     for name in ("a", "b"):
         (folder / f"{name}.csv").write_text(f"time_s,yaw_rad\n{rows}\n")
-    for name in ("two", "bare", "odd"):
+    for name in ("two", "plain", "odd"):
         import_records([folder / "a.csv", folder / "b.csv"], folder / name)
     (folder / "odd.diagnosis.json").write_text('{"verdict": 1, "provenance": []}')
     with bench(folder, prelude=FULL_DISK) as found:

@@ -64,9 +64,9 @@ def upload(
         ("/%ff%00%0a/report.html", 404, "there is no campaign"),
         ("/%2e%2e/report.html", 404, "there is no campaign"),
         ("/<script>/report.html", 404, "&lt;script&gt;"),
-        ("/bare/report.html", 409, "Identify the campaign"),
-        ("/bare/fit.html", 409, "Diagnose the campaign first."),
-        ("/bare/report", 409, "Identify the campaign"),
+        ("/plain/report.html", 409, "Identify the campaign"),
+        ("/plain/fit.html", 409, "Diagnose the campaign first."),
+        ("/plain/report", 409, "Identify the campaign"),
         ("/odd/fit.html", 409, "odd.diagnosis.json"),
     ],
 )
