@@ -103,9 +103,7 @@ def test_a_shaken_and_a_pushed_cart_from_file_to_report(tunnel: Tunnel, tmp_path
         status, printed, _ = tunnel("import", *files, "--out", cart, *stated, "--yes")
         assert status == 0
         shown = [printed.replace(str(tmp_path), "")]
-        status, printed, _ = tunnel(
-            "diagnose", cart, "--json", answer, "--effects", KINDS
-        )
+        status, printed, _ = tunnel("diagnose", cart, "--json", answer, "--effects", KINDS)
         assert status == 0
         shown.append(printed)
         document = json.loads(answer.read_text())

@@ -24,9 +24,7 @@ from tunnel_sim.vocabulary.campaign import Campaign
 STATED = tuple((spring, speed) for spring in (16.12, 21.02, 44.84) for speed in (0.0, 13.9, 19.4))
 SOFT, BY = 44.84, 0.03
 WIND, SPRING = 0.003, 0.0005
-CAUSES = vocabulary(
-    ("coulomb_friction", "spring_miscalibration", "wind_speed_scatter", "stiffness_scatter")
-)
+CAUSES = vocabulary(("coulomb_friction", "spring_miscalibration", "wind_speed_scatter", "stiffness_scatter"))
 KINDS = (*CAUSES, *vocabulary(("cubic_stiffness", "wind_speed_offset")))
 
 
