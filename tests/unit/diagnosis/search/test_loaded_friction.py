@@ -34,6 +34,7 @@ from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.record import Array, Record
 from tunnel_sim.vocabulary.rig import JointLaw, Term
 
+pytestmark = pytest.mark.usefixtures("models_in_this_process")
 FRICTION, GRAVITY = effect_class("coulomb_friction"), effect_class("gravity_stiffness")
 LOAD = "coulomb_friction.load"
 CONDITIONS = ((16.12, 0.0), (44.84, 0.0), (44.84, 15.0))
