@@ -108,7 +108,9 @@ class Tab:
     All tabs of a browser are in one context, whose cache holds the scripts of the pages.
     """
 
-    def __init__(self, browser: Any, served: Bench, *, width: int = 1280, height: int = 900) -> None:
+    def __init__(
+        self, browser: Any, served: Bench, path: str = "", *, width: int = 1280, height: int = 900
+    ) -> None:
         self.context = browser.contexts[0] if browser.contexts else browser.new_context()
         self.context.grant_permissions(["clipboard-read", "clipboard-write"], origin=served.base)
         self.page = self.context.new_page()
@@ -122,7 +124,10 @@ class Tab:
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
         self.page.on("request", lambda request: self.requests.append(request.url))
         self._base = served.base
-        self._go(served.address)
+        if not (path and self.context.cookies(served.base)):  # the first page gives the cookie
+            self._go(served.address)
+        if path:
+            self.open(path)
 
     def open(self, path: str) -> None:
         self._go(self._base + path)
@@ -175,7 +180,7 @@ class Tab:
 
 
 @contextmanager
-def tab(browser: Any, served: Bench, **given: int) -> Iterator[Tab]:
-    found = Tab(browser, served, **given)
+def tab(browser: Any, served: Bench, path: str = "", **given: int) -> Iterator[Tab]:
+    found = Tab(browser, served, path, **given)
     yield found
     found.close()

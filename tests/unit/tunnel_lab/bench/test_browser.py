@@ -169,8 +169,7 @@ def test_the_next_run_is_proposed_and_can_be_kept(browser: Any, served: Bench) -
     shutil.copytree(served.folder / "two", served.folder / "next")
     session = Session(served.folder, "next")
     _diagnosed(session)
-    with tab(browser, served) as one:
-        one.open("/next/next-run")
+    with tab(browser, served, "/next/next-run") as one:
         one.page.wait_for_selector("text=81.5 N m/rad")
         with one.page.expect_download() as found:
             one.click("Download the plan")
@@ -267,9 +266,8 @@ def test_nobody_else_is_answered(served: Bench, headers: dict[str, str]) -> None
 def test_conditions_are_typed_pasted_checked_and_saved(browser: Any, served: Bench) -> None:
     shutil.copytree(served.folder / "two", served.folder / "typed")  # in which one record has two conditions
     session = Session(served.folder, "typed")
-    with tab(browser, served) as one:
+    with tab(browser, served, "/typed/conditions") as one:
         page = one.page
-        one.open("/typed/conditions")
         for key, text in (("wind_speed", "12"), ("spring_stiffness", "16")):
             page.dblclick(f"[row-id=a] [col-id={key}]")
             page.keyboard.press("Control+a")
@@ -294,9 +292,9 @@ def test_conditions_are_typed_pasted_checked_and_saved(browser: Any, served: Ben
 def test_two_tabs_of_one_campaign_do_not_undo_each_other(browser: Any, served: Bench) -> None:
     shutil.copytree(served.folder / "two", served.folder / "both")
     sizes = (("width [m]", "width", 0.2), ("frontal area A [m²]", "frontal_area", 0.03))
-    with tab(browser, served) as one, tab(browser, served) as two:
+    page = "/both/conditions"
+    with tab(browser, served, page) as one, tab(browser, served, page) as two:
         for opened in (one, two):
-            opened.open("/both/conditions")
             opened.page.wait_for_selector(".ag-row")
         for opened, (label, key, value) in zip((one, two), sizes, strict=True):
             field = opened.page.get_by_label(label)
@@ -312,9 +310,7 @@ def _stated(campaign: Path, key: str, value: float) -> bool:
 
 def test_two_tabs_do_not_mix(browser: Any, served: Bench) -> None:
     shutil.copytree(served.folder / "two", served.folder / "other")
-    with tab(browser, served) as one, tab(browser, served) as two:
-        one.open("/two/conditions")
-        two.open("/other/conditions")
+    with tab(browser, served, "/two/conditions") as one, tab(browser, served, "/other/conditions") as two:
         for opened, text in ((one, "0.5"), (two, "0.7")):
             field = opened.page.get_by_label("reference length l [m]")
             field.fill(text)
@@ -329,8 +325,7 @@ def test_the_fit_over_the_data_is_beside_the_answer(browser: Any, served: Bench)
     shutil.copytree(served.folder / "two", served.folder / "fitted")
     session = Session(served.folder, "fitted")
     _diagnosed(session)
-    with tab(browser, served) as one:
-        one.open("/fitted/diagnose")
+    with tab(browser, served, "/fitted/diagnose") as one:
         fit = one.page.frame_locator('iframe[title="The fit over the data"]')
         fit.locator(".uplot").nth(1).wait_for()
         shown = fit.locator("select option").all_inner_texts()

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-import asammdf
 import numpy as np
 import pytest
 
@@ -35,6 +34,8 @@ TWO: Groups = {
 
 
 def by_asammdf(path: Path, groups: Groups) -> None:
+    import asammdf  # which takes half a second: only the worker of this file needs it
+
     with asammdf.MDF(version="4.10") as file:
         for name, (time, columns) in groups.items():
             signals = []
@@ -47,6 +48,8 @@ def by_asammdf(path: Path, groups: Groups) -> None:
 
 
 def by_asammdf_compressed(path: Path, groups: Groups) -> None:
+    import asammdf
+
     by_asammdf(path, groups)
     with asammdf.MDF(path) as file:
         file.save(path.with_suffix(".packed.mf4"), compression=2, overwrite=True)

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from datetime import datetime, timedelta
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import nptdms
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from scipy.integrate import OdeSolution, solve_ivp
 
 from tunnel_sim import TunnelError
 from tunnel_sim.files.importing.choices import ImportChoices
@@ -30,15 +31,18 @@ def torque(time: Array) -> Array:
     return np.asarray(np.sin(6.0 * time + 0.3 * time**2))
 
 
-_MOTION = solve_ivp(
-    lambda t, y: [y[1], 10.0 * float(torque(np.asarray(t))) - 1.3 * y[1] - 158.0 * y[0]],
-    (0.0, END + 1.0), [0.0, 0.0], rtol=1e-8, atol=1e-10, dense_output=True,
-).sol  # fmt: skip
+@cache
+def motion() -> OdeSolution:
+    """Angle and rate of an oscillator of 12.57 rad/s under the torque, from its rest at 0."""
+    return solve_ivp(
+        lambda t, y: [y[1], 10.0 * float(torque(np.asarray(t))) - 1.3 * y[1] - 158.0 * y[0]],
+        (0.0, END + 1.0), [0.0, 0.0], rtol=1e-8, atol=1e-10, dense_output=True,
+    ).sol  # fmt: skip
 
 
 def angle(time: Array) -> Array:
-    """The response of an oscillator of 12.57 rad/s, rad."""
-    return np.asarray(_MOTION(time)[0])
+    """The response of the oscillator, rad."""
+    return np.asarray(motion()(time)[0])
 
 
 def times(rate: float = RATE, first: float = 0.0, last: float = END) -> Array:
