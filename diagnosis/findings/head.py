@@ -114,7 +114,8 @@ def _what(answer: Findings) -> str:
     if scattering(causes):
         sized.append(BETWEEN_RUNS if sized else _scatter(answer))
     words = "; and ".join(["; ".join(sized[:-1]), sized[-1]]) if len(sized) > 1 else sized[0]
-    return f"{words}{', which explain only part of the gap' if answer.rest_is_material else ''}{odd}"
+    explains = "explain" if len(sized) > 1 else "explains"
+    return f"{words}{f', which {explains} only part of the gap' if answer.rest_is_material else ''}{odd}"
 
 
 _MOST_SIZED = 3  # maximum number of causes named with their sizes

@@ -196,6 +196,14 @@ def test_the_only_cause_names_the_changes_of_the_coefficients_as_the_verdict_doe
     assert re.findall(r"by (\d+) %", verdict) == re.findall(r"by (\d+) %", first) == ["10", "20"]
 
 
+@pytest.mark.parametrize(("causes", "explain"), [([DRY, SPRING], "explain"), ([DRY], "explains")])
+def test_the_causes_of_a_part_of_the_gap_are_said_to_explain_a_part(causes: list[str], explain: str) -> None:
+    given = two_causes(causes=causes)
+    given["candidates"][0] |= {"effect": " + ".join(causes)}
+    given["rest"] |= {"significant": True, "material": True}
+    assert Head.of(findings_of(given)).what.endswith(f", which {explain} only part of the gap")
+
+
 def test_a_caveat_that_changes_the_answer_stands_in_the_head_and_no_other() -> None:
     given = two_causes()
     given["found"]["cautions"] = [
