@@ -124,6 +124,8 @@ class Centre:
         swing: half the largest distance of two neighbouring peaks, in the same unit.
         square: mean square of the clear swings, in the square of that unit.
         omega: angular frequency of the oscillation, rad/s.
+        by_amplitude: largest shift by the amplitude, in the reading's unit; it would move the centre along the
+            run as well.
     """
 
     run: Run
@@ -132,20 +134,27 @@ class Centre:
     swing: float
     square: float
     omega: float
+    by_amplitude: float
 
 
 _EXPLAINED_TO = (
     0.01  # relative tolerance between a shift and its cause: a wind varies by some tenths of a per cent
 )
-# minimum number of runs beyond the number of shifts, for a comparison of the remaining zeros
-_LEAST_BEYOND = 3
+# minimum number of runs beyond the number of shifts, for a comparison of the remaining zeros: with shifts by the
+# amplitude, and with those bounded by each run itself
+_LEAST_BEYOND, _LEAST_BESIDE = 3, 2
+# standard deviations of the centre's change along a run for the largest shift by the amplitude, and a factor on
+# this change, which follows the square of the amplitude or less
+_LARGEST, _CURVED = 3.0, 2.0
 
 
 def with_zeros(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
     """Give every run its own zero where the records show different zeros, unless the campaign states one.
 
     Runs of equal spring, wind and swing are compared: with an asymmetric spring the centre depends on the
-    amplitude, and in a stream at an angle on the wind. After removing such shifts, all runs are also compared.
+    amplitude, and in a stream at an angle on the wind. Runs of other swings are compared as well as their shifts by
+    the amplitude are known: these would move the centre along each run, too. At last all runs are compared, after
+    removing such shifts.
     """
     if campaign.sensor.zero not in (None, "auto"):
         return campaign, ()
@@ -153,14 +162,19 @@ def with_zeros(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
     centres = [centre for centre in found if centre is not None]
     middle = float(np.median([centre.zero for centre in centres])) if centres else 0.0
     centres = [replace(c, std=float(np.hypot(c.std, _EXPLAINED_TO * (c.zero - middle)))) for c in centres]
-    groups = _of_equal_conditions(centres)
-    scatter = sum(_scatter(group, np.ones((len(group), 1))) for group in groups)
-    freedom = sum(len(group) - 1 for group in groups)
+    bounded = [replace(c, std=float(np.hypot(c.std, c.by_amplitude))) for c in centres]
     words = " under equal conditions"
-    if freedom == 0 or scatter <= float(chdtri(freedom, MISFIT_RATE)):
-        shifts = _shifts(centres)
+    for groups in (_of_equal_conditions(centres, EQUAL_SWINGS), _of_equal_conditions(bounded, 0.0)):
+        scatter = sum(_scatter(group, np.ones((len(group), 1))) for group in groups)
+        freedom = sum(len(group) - 1 for group in groups)
+        if freedom and scatter > float(chdtri(freedom, MISFIT_RATE)):
+            break
+    else:
+        shifts, least = _shifts(centres), _LEAST_BEYOND
+        if len(centres) - shifts.shape[1] < least:
+            centres, shifts, least = bounded, _shifts(centres, by_amplitude=False), _LEAST_BESIDE
         freedom = len(centres) - shifts.shape[1]
-        if freedom < _LEAST_BEYOND or _scatter(centres, shifts) <= float(chdtri(freedom, MISFIT_RATE)):
+        if freedom < least or _scatter(centres, shifts) <= float(chdtri(freedom, MISFIT_RATE)):
             return campaign, ()
         groups, words = [centres], ", more than wind, spring and amplitude shift them"
     largest = max(max(c.zero for c in group) - min(c.zero for c in group) for group in groups)
@@ -175,8 +189,12 @@ def with_zeros(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
     return replace(campaign, sensor=replace(campaign.sensor, zero="per_run")), (remark,)
 
 
-def _of_equal_conditions(centres: list[Centre]) -> list[list[Centre]]:
-    """Groups of two or more centres of equal spring, wind and swing."""
+def _of_equal_conditions(centres: list[Centre], swings: float) -> list[list[Centre]]:
+    """Groups of two or more centres of equal spring and wind.
+
+    Args:
+        swings: minimum ratio of the swings in a group.
+    """
     by_condition: dict[tuple[float | None, ...], list[Centre]] = defaultdict(list)
     setting = speed_groups(centre.run.wind_speed for centre in centres)
     for centre in centres:
@@ -186,23 +204,24 @@ def _of_equal_conditions(centres: list[Centre]) -> list[list[Centre]]:
     for one in by_condition.values():
         left = sorted(one, key=lambda centre: -centre.swing)
         while left:
-            alike = [centre for centre in left if centre.swing >= EQUAL_SWINGS * left[0].swing]
+            alike = [centre for centre in left if centre.swing >= swings * left[0].swing]
             left = left[len(alike) :]
             if len(alike) > 1:
                 groups.append(alike)
     return groups
 
 
-def _shifts(centres: list[Centre]) -> Array:
+def _shifts(centres: list[Centre], *, by_amplitude: bool = True) -> Array:
     """Possible shifts of a run's centre from a common zero, in columns, shape (runs, shifts).
 
     They are a constant moment, a moment proportional to the dynamic pressure, and the mean moment of an asymmetric
     spring, each over the stiffness, which is proportional to ω²; and an error of the reading proportional to the
-    square of the angle.
+    square of the angle. The last two are left out without ``by_amplitude``.
     """
     omega, square = (np.array([getattr(c, name) for c in centres]) for name in ("omega", "square"))
     pressure = np.array([(c.run.air_density or 1.0) * c.run.wind_speed**2 for c in centres])
-    columns = [np.ones(len(centres)), omega**-2, pressure * omega**-2, square * omega**-2, square]
+    columns = [np.ones(len(centres)), omega**-2, pressure * omega**-2]
+    columns += [square * omega**-2, square] if by_amplitude else []
     sized = np.column_stack([column / (np.max(np.abs(column), initial=0.0) or 1.0) for column in columns])
     vectors, values, _ = np.linalg.svd(sized, full_matrices=False)
     return np.asarray(vectors[:, values > 1e-6 * values.max(initial=0.0)], np.float64)
@@ -244,8 +263,11 @@ def centre_of(run: Run, resolution: float) -> Centre | None:
     chance = float(clear.std(ddof=1)) * np.sqrt(2.0 / clear.size)
     std = float(np.linalg.norm([along, chance, resolution / np.sqrt(12.0)]))
     omega = np.pi * (times.size - 1) / float(times[-1] - times[0])
-    square = float(np.mean(swings[1:][seen] ** 2))
-    return Centre(run, float(clear.mean()), std, float(swings.max()), square, omega)
+    squares = swings[1:][seen] ** 2
+    square = float(np.mean(squares))
+    fall = 0.5 * float(squares[:half].mean() - squares[half:].mean())
+    by_amplitude = float(np.hypot(_CURVED * along, _LARGEST * chance)) * square / max(fall, 1e-9 * square)
+    return Centre(run, float(clear.mean()), std, float(swings.max()), square, omega, by_amplitude)
 
 
 _SQUARABLE = 1e100  # of the reading's unit: squares of larger readings overflow

@@ -320,17 +320,13 @@ def test_springs_that_may_be_off_are_said_with_what_would_tell():
     alike = said("spring_miscalibration", choices=[OFF | {"stiffness": 16.121}, OFF | {"stiffness": 16.124}])
     assert "16.121 N m/rad is" in alike
     assert "16.124 N m/rad is" in alike
-    both = {
-        "kind": "two springs off",
-        "springs": [OFF, OFF | {"stiffness": 21.0}],
-        "beside": ["coulomb_friction"],
-    }
-    text = said("unknown", rivals=[both])
-    assert (
-        "would explain the gap beside coulomb friction: for example, 16.12 N m/rad is 1.961 ± 0.010 % softer than "
-        "stated and 21 N m/rad"
-    ) in text
-    assert text.endswith(". Measure their stiffness again.")
+
+
+def test_a_rival_says_its_own_words_at_the_end():
+    text = said(
+        "unknown", rivals=[{"kind": "two springs off", "words": "Two springs would explain the gap."}]
+    )
+    assert text.endswith(" Two springs would explain the gap.")
 
 
 def test_a_second_mode_of_every_run_is_said_before_the_gap():
