@@ -257,7 +257,9 @@ def _shows(source: MomentSource, fitted: Fit, kinds: Sequence[type[Effect]]) -> 
     if process is None or not _shown_apart(process, source, fitted, kinds):
         return False
     if source.in_every_run and (
-        is_of_reading(fitted, process) or is_a_line(fitted, process) or is_slow(fitted, process, source)
+        is_of_reading(fitted, process)
+        or is_a_line(fitted, process)
+        or is_slow(fitted, process, source, kinds)
     ):
         return False
     return is_steady_noise(process, chosen)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -10,9 +11,13 @@ from scipy.special import chdtri
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import residual_spectra
+from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.search.process_noise import ProcessNoise, acts_by, likeliest, random_moments
 from diagnosis.search.random_spectra import MomentSource
+from diagnosis.search.scatter import with_own_linear_terms
 from diagnosis.settings import RandomMomentSettings
+from tunnel_sim.effects import Effect
+from tunnel_sim.vocabulary.record import Array
 
 WHITE_INNOVATIONS: Final = 10.0
 """Maximum deviation of the power of the innovations from white noise, by band and by quarter of a record, in
@@ -34,6 +39,12 @@ SLOW_SHARE: Final = 0.5
 """Share of the drop of −2 ln L by a random moment that slow changes of the reading bring, above which it is none.
 Convention. More than half. The rig resonates, so of nine drawn moments of the surroundings it is 0.006 at most."""
 
+OWN_TERMS_SHARE: Final = 0.9
+"""Share of the drop of −2 ln L by a random moment that a spring, a damping, a zero and a drift of each run bring,
+above which it is none. Judgement. A straight line leaves 0.4 of a random walk; of seven drawn moments of the
+surroundings it is 0.64 at most."""
+
+_ABSORBED = 1e-9  # least singular value of the columns of a run, relative to the largest
 _LINE_WIDTHS = 3.0  # about the centre of a spectrum in which a line is sought
 
 
@@ -125,19 +136,37 @@ def is_a_line(fit: Fit, process: ProcessNoise) -> bool:
     return max(drops) > STEADY_LINE_SHARE * sum(left)
 
 
-def is_slow(fit: Fit, process: ProcessNoise, source: MomentSource) -> bool:
-    """Whether a zero of each run, or its drift, explains as much as the random moment.
+def is_slow(fit: Fit, process: ProcessNoise, source: MomentSource, kinds: Sequence[type[Effect]]) -> bool:
+    """Whether a zero of each run, or its drift, explains as much, or all of it beside a spring and a damping.
 
     A random moment moves the rig most near its resonance. A zero that differs from run to run has the spectrum of a
-    moment that lasts longer than the run.
+    moment that lasts longer than the run. Within a run, the amplitude and the phase wander under a random moment; a
+    spring and a damping of the run leave a third or more of that.
 
     Args:
         fit: as in `is_a_line`.
         process: the most likely random moment of the source in its residual.
+        kinds: the effects that may be named.
     """
+    own = [columns for _, columns in fit.jacobian]
+    if _drop_beside(own, fit, source) < (1.0 - SLOW_SHARE) * process.drop:
+        return True
+    widest = with_own_linear_terms(fit, kinds)
+    if widest is None:
+        return False
+    linear = [columns for _, columns in sensitivities(*widest)]
+    return _drop_beside(linear, fit, source) < (1.0 - OWN_TERMS_SHARE) * process.drop
+
+
+def _drop_beside(own: Sequence[Array], fit: Fit, source: MomentSource) -> float:
+    """Drop of −2 ln L by the likeliest moment in residuals without a zero, a drift and other terms of the runs."""
     quick = []
-    for residual in fit.residuals:
-        slow = np.linalg.qr(np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, residual.size), 2))[0]
+    for residual, columns in zip(fit.residuals, own, strict=True):
+        drift = np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, residual.size), 2)
+        both = np.column_stack([columns, drift])
+        sized = both / np.maximum(np.linalg.norm(both, axis=0), 1e-300)
+        vectors, values, _ = np.linalg.svd(sized, full_matrices=False)
+        slow = vectors[:, values > _ABSORBED * values[0]]
         quick.append(residual - slow @ (slow.T @ residual))
     left = likeliest(random_moments(replace(fit, residuals=quick), source), fit.settings.moment)
-    return left is None or left.drop < (1.0 - SLOW_SHARE) * process.drop
+    return 0.0 if left is None else left.drop

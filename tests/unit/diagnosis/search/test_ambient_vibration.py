@@ -40,7 +40,7 @@ from tests.support.gap_campaigns import (
     whole_runs,
 )
 from tests.support.scattered_runs import SCATTERED
-from tunnel_sim.effects import Effect, effect_class, effect_from
+from tunnel_sim.effects import ALL_EFFECTS, Effect, effect_class, effect_from
 from tunnel_sim.vocabulary.campaign import Campaign, Repeatability
 from tunnel_sim.vocabulary.record import Record
 
@@ -179,7 +179,19 @@ def test_zeros_that_differ_are_no_random_moment(moment: float, wander: float) ->
     fitted = nominal(replace(data, runs=tuple(runs)))
     process = likeliest(random_moments(fitted, SURROUNDINGS), fitted.settings.moment)
     assert process is not None
-    assert is_slow(fitted, process, SURROUNDINGS) == (wander > 0.0)
+    assert is_slow(fitted, process, SURROUNDINGS, ALL_EFFECTS) == (wander > 0.0)
+
+
+@pytest.mark.parametrize(("moment", "spread"), [(0.0, 5e-4), (0.02, 0.0)])
+def test_springs_that_differ_from_run_to_run_are_no_random_moment(moment: float, spread: float) -> None:
+    """Each run swings steadily; under a random moment its amplitude and its phase wander."""
+    data, rng = shaken(campaign(), moment=moment), np.random.default_rng(3)
+    stated = [run.spring_stiffness * (1.0 + spread * rng.standard_normal()) for run in data.runs]
+    runs = [replace(run, spring_stiffness=one) for run, one in zip(data.runs, stated, strict=True)]
+    fitted = nominal(replace(data, runs=tuple(runs)))
+    process = likeliest(random_moments(fitted, SURROUNDINGS), fitted.settings.moment)
+    assert process is not None
+    assert is_slow(fitted, process, SURROUNDINGS, ALL_EFFECTS) == (spread > 0.0)
 
 
 def test_a_spring_of_its_own_is_no_random_moment_and_hides_none() -> None:
