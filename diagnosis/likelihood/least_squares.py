@@ -298,7 +298,7 @@ def fit_near(problem: Problem, start: Point, base: Fit, *, max_iterations: int) 
         state = _State(problem, clip(problem, start))
         known: Fit | None = base
         state.linearise(known)
-        fresh = True
+        fresh = True  # whether the sensitivities, apart from the known ones, are those at the current point
         for _ in range(max_iterations):
             end = state.foreseen()
             drop = state.here.cost - end.cost
