@@ -67,6 +67,9 @@ def _check(diagnosis: Diagnosis) -> None:
         dimension(given.unit)
         if given.std is not None and given.std < 0.0:
             raise ValueError(f"a standard deviation is {given.std:g}")
+    for rival in diagnosis.found.rivals:
+        if not isinstance(rival.figures.get("words"), str):
+            raise ValueError(f"the rival {rival.kind!r} has no words")
     for spread in diagnosis.repeated.spreads:
         if min(spread.width, *spread.interval) < 0.0:
             raise ValueError(f"the width of a scatter is {spread.width:g}")

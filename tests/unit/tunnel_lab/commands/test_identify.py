@@ -101,16 +101,15 @@ def test_plot_draws_the_fit_of_a_diagnosis(tunnel: Tunnel, tiny_campaign: Path, 
 
 @pytest.mark.usefixtures("unrendered")
 def test_an_unknown_unit_or_a_lost_field_of_a_diagnosis_is_one_line(tunnel: Tunnel, tmp_path: Path) -> None:
-    spoilt = [document() for _ in range(4)]
+    spoilt = [document() for _ in range(5)]
     spoilt[0]["maps"]["unit"] = "x"
     spoilt[1]["gap"]["misfit"]["unit"] = "x"
     spoilt[2]["coefficients"]["after"]["cn_beta"]["unit"] = "furlong"
     del spoilt[3]["maps"]["traces"][0]["time_s"]
-    for given, field in zip(
-        spoilt,
-        ("'x' is no unit of a reading",) * 2 + ("'furlong'", "maps.traces.0.time_s: Field required"),
-        strict=True,
-    ):
+    spoilt[4].setdefault("found", {})["rivals"] = [{"kind": "two springs off", "springs": []}]
+    unit, lost = "'x' is no unit of a reading", "maps.traces.0.time_s: Field required"
+    said = (unit, unit, "'furlong'", lost, "the rival 'two springs off' has no words")
+    for given, field in zip(spoilt, said, strict=True):
         (tmp_path / "answer.json").write_text(json.dumps(given))
         status, _, err = tunnel("plot", tmp_path / "answer.json", "--out", tmp_path / "figures")
         assert (status, err.count("\n")) == (2, 1), err
