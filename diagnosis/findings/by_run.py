@@ -133,6 +133,8 @@ class CausesByRun(Finding):
             return None
 
         fit = in_its_noise(study)
+        if fit is None:
+            return None
         units = _units(fit)
         free = {name: Quantity(fit.value(name), None, units[name]) for name in units}
 
@@ -199,14 +201,19 @@ def _units(fit: Fit) -> dict[str, str]:
     return {name: infos[name].unit for name in fit.problem.names if name in infos}
 
 
-def in_its_noise(study: Study) -> Fit:
+def in_its_noise(study: Study) -> Fit | None:
     """The fit of the answer, with the response to its random moment in the noise of the runs.
 
     This motion differs from run to run, so the sizes would differ by more than the errors of the sensor's noise.
+
+    Returns:
+        None where the filter of the response does not settle.
     """
     fit = study.chosen
-    noisy = None if study.moment is None else with_response(fit, study.moment.process.spectrum)
-    return fit if noisy is None else fit_at(replace(fit.problem, data=noisy), fit.point)
+    if study.moment is None:
+        return fit
+    noisy = with_response(fit, study.moment.process.spectrum)
+    return None if noisy is None else fit_at(replace(fit.problem, data=noisy), fit.point)
 
 
 def sizes(fit: Fit, kinds: Sequence[type[Effect]]) -> Iterator[SizeByRun]:

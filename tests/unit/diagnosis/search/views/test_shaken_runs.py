@@ -48,7 +48,9 @@ def test_a_moment_is_named_after_stretches_where_there_is_one(names: tuple[str, 
     assert loses_phase(nominal(data))
     study = investigate(data, KINDS)
     assert study.causes == tuple(sorted(names))
-    sizes_by_run = list(sizes(in_its_noise(study), KINDS))
+    fit = in_its_noise(study)
+    assert fit is not None
+    sizes_by_run = list(sizes(fit, KINDS))
     assert all(cause.agrees for cause in sizes_by_run)
     assert len(sizes_by_run) == len({SPRING, FRICTION} & set(names))
     if study.moment is not None:  # the random motion is no error of the sensor
