@@ -75,7 +75,7 @@ def overdispersion(fitted: Fit, kind: type[Effect]) -> float:
     """Factor by which the variance of an effect's parameters exceeds its value in independent noise, 1 or more.
 
     An effect that one run shows almost alone may be an odd run; the variance is then mostly the disagreement of the
-    other runs.
+    other runs. Where no other run shows it at all, none disagrees, and the factor says nothing.
 
     Returns:
         The mean over the parameters, from the changes of the estimate as each run is left out, by linear theory

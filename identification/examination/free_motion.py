@@ -152,9 +152,9 @@ def with_zeros(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
     """Give every run its own zero where the records show different zeros, unless the campaign states one.
 
     Runs of equal spring, wind and swing are compared: with an asymmetric spring the centre depends on the
-    amplitude, and in a stream at an angle on the wind. Runs of other swings are compared as well as their shifts by
-    the amplitude are known: these would move the centre along each run, too. At last all runs are compared, after
-    removing such shifts.
+    amplitude, and in a stream at an angle on the wind. Runs of unequal swing are compared as far as each run bounds
+    its shift by the amplitude, since this shift would move the centre along the run, too. Last, all runs are
+    compared, without the part of their zeros that such shifts explain.
     """
     if campaign.sensor.zero not in (None, "auto"):
         return campaign, ()
