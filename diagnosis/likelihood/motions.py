@@ -20,6 +20,7 @@ from tunnel_sim.effects.chain import reads_plainly
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_run, integrate
 from tunnel_sim.physics.input_moment import InputMoment, Lines
+from tunnel_sim.physics.lagged_start import lagged_at_start
 from tunnel_sim.physics.moment_law import run_dtype
 from tunnel_sim.physics.rod_modes import Ringing, slow_motion
 from tunnel_sim.physics.run_settings import (
@@ -118,8 +119,8 @@ class CompiledRuns:
             if twist is not None and (found := _apart(physics, place, asked, rig))
         }
         rows, winds = np.zeros(count, run_dtype()), physics.wind_speed.copy()
-        rows["angle"] = rows["lagged"] = physics["release_angle"]
-        rows["rate"], rows["wind_count"] = physics["release_rate"], 1.0
+        rows["angle"], rows["rate"] = physics["release_angle"], physics["release_rate"]
+        rows["wind_count"] = 1.0
         rows["wind"] = winds.ctypes.data + winds.itemsize * np.arange(count)
         kept: list[Sequence[Array]] = [()] * count
         objects = zip(physics.rod_twist, physics.program, physics.drive, strict=True)
@@ -132,8 +133,11 @@ class CompiledRuns:
             elif series or any(given):
                 row, kept[place] = forward_run(physics.row(place))
                 rows[place] = row[0]
+        begins = np.array([run.start for run in runs])
+        rows["lagged"] = lagged_at_start(physics, rig, begins)
         for place, (lead, stiffness, body, _) in slow.items():
-            rows["lead"][place], rows["rod_stiffness"][place], rows["lagged"][place] = lead, stiffness, body
+            rows["lead"][place], rows["rod_stiffness"][place] = lead, stiffness
+            rows["lagged"][place] = body if begins[place] == 0.0 else (1.0 + lead) * rows["lagged"][place]
         interval = np.array([run.interval for run in runs])
         size = np.array([run.reading.size for run in runs])
         length = np.array([run.duration for run in runs])
