@@ -121,7 +121,7 @@ def _answered(
     if found.repeats is not None and found.repeats.outlier:
         say(f"without run {found.repeats.outlier}")
         others = _without_outlier(study, found.repeats, chosen, settings, rivals)
-        if others is not None and _explained_without(others, study):
+        if others is not None and _only_odd(others, study):
             found = Confirmed.of(others)
         elif others is not None:
             without = AnswerWithout(
@@ -144,15 +144,18 @@ def _without_outlier(
     return replace(found, disturbed=together(study.disturbed, found.disturbed, [odd]))
 
 
-def _explained_without(others: Study, study: Study) -> bool:
-    """Whether the gap vanishes without the runs that only one of two studies leaves out.
+def _only_odd(others: Study, study: Study) -> bool:
+    """Whether the gap, or all scatter, vanishes without the runs that only one of two studies leaves out.
 
-    A run that alone has its wind state or its spring may differ for that reason.
+    Scatter by chance shows in more than one run. A run that alone has its wind state or its spring may differ for
+    that reason.
     """
     data = study.nominal.problem.data
     able = {data.runs[index].id for index in replaceable(data)}
     kept = {run.id for run in others.campaign.runs}
-    return not others.gap.test.detected and all(run.id in able | kept for run in data.runs)
+    repeats = study.scattering and not others.scattering and others.fitted == study.fitted
+    vanishes = not others.gap.test.detected or bool(repeats)
+    return vanishes and all(run.id in able | kept for run in data.runs)
 
 
 def _studied(chosen: Chosen, progress: Progress | None, settings: Settings, rivals: Sequence[Rival]) -> Study:

@@ -212,3 +212,13 @@ def test_a_run_far_beyond_the_others_is_an_outlier() -> None:
     assert set(others.causes) <= {STIFFNESS, DAMPED}
     assert f"Run {faulty.id} deviates far beyond the others" in found.verdict
     assert "Without it " in found.verdict
+
+
+def test_scatter_that_one_run_shows_is_an_odd_run() -> None:
+    runs = campaign(scatter=0.0, cubic=0.1)
+    faulty = campaign(scatter=15.0, cubic=0.1).runs[4]
+    changed = tuple(faulty if run.id == faulty.id else run for run in runs.runs)
+    found = diagnose(replace(runs, runs=changed), kinds=FEW)
+    assert found.causes == ("cubic_stiffness",)
+    assert [one.run for one in found.disturbed] == [faulty.id]
+    assert f"Run {faulty.id} differs from the others. It is not used." in found.verdict
