@@ -16,9 +16,9 @@ _LARGEST = 100.0  # of an exponent
 def lagged_at_start(runs: SettingsTable, rig: Rig, since_release: DurationPerRun) -> Angles:
     """The angle that the air sees at the start of runs with rigid rods, rad, shape (runs,).
 
-    The body is held at its angle, released from rest, and oscillates linearly until the run starts. The state is the
-    response of the lag to this oscillation and the rest of its state at the release, which fades with the time
-    constant.
+    The body is held at its angle, released from rest, and oscillates linearly until the run starts. The state is
+    the response of the lag to this oscillation, and the rest of its state at the release, which fades with the
+    time constant.
 
     Args:
         runs: with the angle and the rate at the start.
@@ -48,7 +48,9 @@ def lagged_at_start(runs: SettingsTable, rig: Rig, since_release: DurationPerRun
             root = -decay + 1j * np.sqrt(stiffness / inertia - decay**2)
             response = 1.0 / (1.0 + root * time)
         amplitude = angle + 1j * (root.real * angle - rate) / root.imag
-        back = np.exp(np.clip(-root.real * since_release, -_LARGEST, _LARGEST) - 1j * root.imag * since_release)
+        back = np.exp(
+            np.clip(-root.real * since_release, -_LARGEST, _LARGEST) - 1j * root.imag * since_release
+        )
         held = (amplitude * back).real - (amplitude * back * response).real
         state = (amplitude * response).real + held * np.exp(-since_release / time)
     return np.where(moving & np.isfinite(state), state, found)
