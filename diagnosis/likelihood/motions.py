@@ -22,7 +22,7 @@ from tunnel_sim.physics.forward import forward_run, integrate
 from tunnel_sim.physics.input_moment import InputMoment, Lines
 from tunnel_sim.physics.lagged_start import lagged_at_start
 from tunnel_sim.physics.moment_law import run_dtype
-from tunnel_sim.physics.rod_modes import Ringing, slow_motion
+from tunnel_sim.physics.rod_modes import Ringing, SlowMotion, separate_ringing
 from tunnel_sim.physics.run_settings import (
     Motion,
     RunSettings,
@@ -113,11 +113,7 @@ class CompiledRuns:
         )
         inputs = {place: drive.exerted for place, drive in physics.inputs.items()}
         driven = np.isin(np.arange(count), list(inputs))
-        slow = {
-            place: found
-            for place, twist in enumerate(physics.rod_twist)
-            if twist is not None and (found := _apart(physics, place, asked, rig))
-        }
+        slow = _separated(physics, asked, rig)
         rows, winds = np.zeros(count, run_dtype()), physics.wind_speed.copy()
         rows["angle"], rows["rate"] = physics["release_angle"], physics["release_rate"]
         rows["wind_count"] = 1.0
@@ -135,9 +131,10 @@ class CompiledRuns:
                 rows[place] = row[0]
         begins = np.array([run.start for run in runs])
         rows["lagged"] = lagged_at_start(physics, rig, begins)
-        for place, (lead, stiffness, body, _) in slow.items():
-            rows["lead"][place], rows["rod_stiffness"][place] = lead, stiffness
-            rows["lagged"][place] = body if begins[place] == 0.0 else (1.0 + lead) * rows["lagged"][place]
+        for place, one in slow.items():
+            rows["lead"][place], rows["rod_stiffness"][place] = one.lead, one.rod_stiffness
+            of_body = (1.0 + one.lead) * rows["lagged"][place]
+            rows["lagged"][place] = one.body_release if begins[place] == 0.0 else of_body
         interval = np.array([run.interval for run in runs])
         size = np.array([run.reading.size for run in runs])
         length = np.array([run.duration for run in runs])
@@ -171,7 +168,7 @@ class CompiledRuns:
             row["moment_count"], row["moment_interval"] = lines.values.size, lines.interval
             row["moment_delay"] = lines.delay
             kept[place] = (*parts, *kept[place])
-        ringing = [slow[place][3] if place in slow else None for place in range(count)]
+        ringing = [slow[place].ringing if place in slow else None for place in range(count)]
         return cls(law, rows, kept, winds, blocks, ringing)
 
     def alike(self) -> list[list[int]]:
@@ -357,22 +354,18 @@ def block_means(runs: Sequence[RunData], angle: Array, rate: Array) -> Array:
     return found
 
 
-def _apart(
-    physics: SettingsTable, place: int, asked: Asked, rig: Rig
-) -> tuple[float, float, float, Ringing] | None:
-    """Replace a run with a flexible rod by its slow motion, or a stiff rod that would be resolved by a rigid one.
+def _separated(physics: SettingsTable, asked: Asked, rig: Rig) -> dict[int, SlowMotion]:
+    """Replace runs with a flexible rod by their slow motion, or a stiff rod that would be resolved by a rigid one.
 
     Returns:
-        The body's lead, the rod's stiffness (N m/rad), the body's release angle (rad) and the ringing to be
-        added, where it was separated.
+        What was separated from the runs, by place.
     """
-    run = physics.row(place)
-    slow = None if asked.resolve_rod_mode else slow_motion(released_by_spring_end(run), rig)
-    if slow is None:
-        physics.put(place, released_by_spring_end(condensed(run, asked.data)))
-        return None
-    physics.put(place, slow.run)
-    return slow.lead, slow.rod_stiffness, slow.body_release, slow.ringing
+    slow = {} if asked.resolve_rod_mode else separate_ringing(physics, rig)
+    for place, twist in enumerate(physics.rod_twist):
+        if twist is not None:
+            run = physics.row(place)
+            physics.put(place, released_by_spring_end(condensed(run, asked.data)))
+    return slow
 
 
 def blocks_beyond(physics: RunSettings, run: RunData) -> int:

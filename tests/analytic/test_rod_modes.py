@@ -12,7 +12,7 @@ from tests.marks import slow
 from tunnel_sim.physics.forward import forward_run, integrate
 from tunnel_sim.physics.input_moment import InputMoment
 from tunnel_sim.physics.moment_law import parameter_vector
-from tunnel_sim.physics.rod_modes import Ringing, slow_motion
+from tunnel_sim.physics.rod_modes import Ringing, separate_ringing
 from tunnel_sim.physics.run_settings import RodTwist, RunSettings, SettingsTable, spring_end_angle
 from tunnel_sim.physics.steps import compensated, fit_stride
 from tunnel_sim.vocabulary.input_kinds import INPUTS
@@ -44,13 +44,21 @@ def followed(settings: RunSettings) -> Array:
     return angle[0]
 
 
+def released_at_the_end(settings: RunSettings) -> SettingsTable:
+    """A table of one run, with the release angle of the spring's end."""
+    table = SettingsTable.of([settings])
+    table["release_angle"][0] = spring_end_angle(settings)
+    return table
+
+
 def separated(settings: RunSettings) -> Array:
     """The upper end's angle as slow motion and ringing."""
-    slow = slow_motion(settings, RIG)
-    assert slow is not None
-    row, keep_alive = slow.forward_run()
+    table = released_at_the_end(settings)
+    slow = separate_ringing(table, RIG)[0]
+    row, keep_alive = forward_run(table.row(0))
+    row["lead"], row["rod_stiffness"], row["lagged"] = slow.lead, slow.rod_stiffness, slow.body_release
     row["steps"], row["step"] = 4, INTERVAL / 4
-    angle, rate, _ = integrate(parameter_vector(slow.run.law(RIG))[None], row, SAMPLES)
+    angle, rate, _ = integrate(parameter_vector(table.row(0).law(RIG))[None], row, SAMPLES)
     del keep_alive
     return slow.ringing.added(angle[0], rate[0], INTERVAL)[0]
 
@@ -105,8 +113,24 @@ def test_a_rod_almost_rigid_has_a_smooth_first_order_effect():
 
 
 def test_a_rod_that_swings_almost_like_the_body_is_not_separated():
-    assert slow_motion(run(0.05, 0.5), RIG) is None
-    assert slow_motion(replace(run(), rod_twist=None), RIG) is None
+    assert not separate_ringing(released_at_the_end(run(0.05, 0.5)), RIG)
+    assert not separate_ringing(released_at_the_end(replace(run(), rod_twist=None)), RIG)
+
+
+def test_runs_are_separated_together_as_alone() -> None:
+    settings = [run(0.05, 0.5), run(1e-3), replace(run(), rod_twist=None), run(5e-3, 0.8, spring=16.0)]
+    table = SettingsTable.of(settings)
+    table["release_angle"][:] = [spring_end_angle(one) for one in settings]
+    together = separate_ringing(table, RIG)
+    assert sorted(together) == [1, 3]
+    for place in together:
+        alone = released_at_the_end(settings[place])
+        slow = separate_ringing(alone, RIG)[0]
+        assert alone.numbers[0].tolist() == table.numbers[place].tolist()
+        assert (slow.lead, slow.ringing.amplitude) == (
+            together[place].lead,
+            together[place].ringing.amplitude,
+        )
 
 
 @pytest.mark.parametrize(

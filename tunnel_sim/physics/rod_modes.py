@@ -9,17 +9,16 @@ on the slow motion.
 
 from __future__ import annotations
 
-import cmath
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_sim.physics.forward import forward_run
 from tunnel_sim.physics.input_moment import InputMoment
-from tunnel_sim.physics.run_settings import RodTwist, RunSettings, spring_end_angle
+from tunnel_sim.physics.run_settings import RodTwist, SettingsTable
 from tunnel_sim.vocabulary.plan import aerodynamic_damping, aerodynamic_stiffness
 from tunnel_sim.vocabulary.quantities import Angles, Rates, Seconds, Times
 from tunnel_sim.vocabulary.record import Array, read_only
@@ -30,6 +29,7 @@ SEPARATION = 5.0
 _GONE = 1e-9  # rad: smaller ringing is not computed
 _MOST_ITERATIONS = 60
 _CONVERGED = 1e-14  # relative
+_Complex: TypeAlias = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +45,12 @@ class Response:
     drive: InputMoment
     root: complex
     residue: complex
+
+    @classmethod
+    def of(cls, linear: _TwoMasses, drive: InputMoment, root: _Complex, lead: _Complex) -> Response:
+        """The response of one linear rig at a root with its lead, shape (1,) each."""
+        residue = linear.residue(root, lead, on_body=drive.on_body)
+        return cls(drive, complex(root[0]), complex(residue[0]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,9 +91,9 @@ def _ends(interval: Seconds, count: int) -> Times:
     return read_only(interval * np.arange(count))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SlowMotion:
-    """A run with a rigid rod and the slow oscillation of the run with a flexible rod.
+    """What a rigid rod lacks of the slow oscillation of a flexible one, and the ringing.
 
     Args:
         lead: lead of the body over the upper end, as a share of the angle there.
@@ -95,22 +101,15 @@ class SlowMotion:
         body_release: the body's release angle, rad.
     """
 
-    run: RunSettings
     lead: float
     rod_stiffness: float
     body_release: float
     ringing: Ringing
 
-    def forward_run(self) -> tuple[NDArray[np.void], Sequence[Array]]:
-        """The run for the compiled integrator; result as from `forward_run`."""
-        row, keep_alive = forward_run(self.run)
-        row["lead"], row["rod_stiffness"], row["lagged"] = self.lead, self.rod_stiffness, self.body_release
-        return row, keep_alive
 
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _TwoMasses:
-    """The linear rig with a flexible rod; its angles are the upper end's and the body's.
+    """Linear rigs with a flexible rod; their angles are the upper end's and the body's. Arrays by run.
 
     Args:
         upper, lower: inertia at either end of the rod, kg m².
@@ -119,108 +118,150 @@ class _TwoMasses:
         air, air_damping: Ka and Ca of the air on the body.
     """
 
-    upper: float
-    lower: float
-    spring: float
-    loss: float
-    rod: float
-    rod_loss: float
-    air: float
-    air_damping: float
+    upper: Array
+    lower: Array
+    spring: Array
+    loss: Array
+    rod: Array
+    rod_loss: Array
+    air: Array
+    air_damping: Array
 
     @classmethod
-    def of(cls, run: RunSettings, rod: RodTwist, rig: Rig) -> _TwoMasses:
-        """The linear part of a run's law."""
-        flow = rig.body.flow(run.air_density, run.wind_speed)
+    def of(cls, runs: SettingsTable, rods: Sequence[RodTwist], rig: Rig) -> _TwoMasses:
+        """The linear part of the runs' laws."""
+        inertia, area, length = runs["yaw_inertia"], rig.body.frontal_area, rig.body.length
+        density, speed = runs.air_density, runs.wind_speed
+        share = np.array([rod.inertia_share for rod in rods])
+        air = aerodynamic_stiffness(
+            runs["cn_beta"], air_density=density, wind_speed=speed, frontal_area=area, reference_length=length
+        )
+        air_damping = aerodynamic_damping(
+            runs["cn_r"], air_density=density, wind_speed=speed, frontal_area=area, reference_length=length
+        )
         return cls(
-            rod.inertia_share * run.yaw_inertia,
-            (1.0 - rod.inertia_share) * run.yaw_inertia,
-            run.spring_stiffness + run.parameters.get("gravity_stiffness", 0.0),
-            run.mechanical_damping,
-            1.0 / rod.compliance,
-            rod.damping(run.yaw_inertia),
-            aerodynamic_stiffness(run.derivatives.cn_beta, **flow),
-            aerodynamic_damping(run.derivatives.cn_r, **flow),
+            share * inertia,
+            (1.0 - share) * inertia,
+            runs.spring_stiffness + runs["gravity_stiffness"],
+            runs["mechanical_damping"],
+            np.array([1.0 / rod.compliance for rod in rods]),
+            np.array([rod.damping(own) for rod, own in zip(rods, inertia.tolist(), strict=True)]),
+            air,
+            air_damping,
         )
 
-    def lead(self, root: complex) -> complex:
+    def lead(self, root: _Complex) -> _Complex:
         """The twist per angle of the upper end in an oscillation exp(root · t), from the balance of the body."""
         free = self.air + self.air_damping * root - self.lower * root**2
         return free / (self.rod + self.rod_loss * root - free)
 
-    def roots(self) -> tuple[complex, complex] | None:
-        """The slow and the fast root, 1/s; None where one does not oscillate, or they are close."""
-        lead, slow = 0j, 0j
+    def roots(self) -> tuple[_Complex, _Complex, NDArray[np.bool_]]:
+        """The slow and the fast root, 1/s, and whether both oscillate, far apart from each other."""
+        lead: _Complex = np.zeros(len(self.upper), np.complex128)
+        slow = lead
+        moving = np.ones(len(self.upper), bool)
         for _ in range(_MOST_ITERATIONS):
-            previous = slow
             # the balance of the whole rig: the body moves 1 + lead times as far as the upper end
             body = 1.0 + lead
-            slow = _upper_root(
+            root = _upper_root(
                 self.upper + self.lower * body,
                 self.loss - self.air_damping * body,
                 self.spring - self.air * body,
             )
-            lead = self.lead(slow)
-            if abs(slow - previous) <= _CONVERGED * abs(slow):
+            # each run stops where it would stop alone
+            settled = ~(np.abs(root - slow) > _CONVERGED * np.abs(root))
+            slow = np.where(moving, root, slow)
+            lead = np.where(moving, self.lead(slow), lead)
+            moving &= ~settled
+            if not moving.any():
                 break
-        else:
-            return None
-        if not slow.imag > 0.0:
-            return None
         # The four roots' sum and product give the other two.
         total = (self.loss + self.rod_loss) / self.upper + (self.rod_loss - self.air_damping) / self.lower
         product = self.rod * (self.spring - self.air) - self.air * self.spring
         product /= self.upper * self.lower
-        fast = _upper_root(1.0, total + 2.0 * slow.real, product / abs(slow) ** 2)
-        return (slow, fast) if fast.imag > 0.0 and abs(fast) > SEPARATION * abs(slow) else None
+        fast = _upper_root(1.0, total + 2.0 * slow.real, product / np.abs(slow) ** 2)
+        apart = (slow.imag > 0.0) & (fast.imag > 0.0) & (np.abs(fast) > SEPARATION * np.abs(slow))
+        return slow, fast, ~moving & apart
 
-    def residue(self, root: complex, *, on_body: bool) -> complex:
+    def row(self, place: int) -> _TwoMasses:
+        """One of the rigs."""
+        return _TwoMasses(*(values[place : place + 1] for values in vars(self).values()))
+
+    def residue(self, root: _Complex, lead: _Complex, *, on_body: bool) -> _Complex:
         """Residue of the upper end's angle per moment on the body or on the upper end, at a root, rad/(N m s)."""
-        lead = self.lead(root)
         body = 1.0 + lead
         turning = 2.0 * root * (self.upper + self.lower * body**2)
         turning += self.loss - self.air_damping * body**2 + self.rod_loss * lead**2
         return (body if on_body else 1.0) / turning
 
 
-def slow_motion(run: RunSettings, rig: Rig) -> SlowMotion | None:
-    """Separate the rod's ringing from the motion of the body on its spring; the run's release angle is the body's.
+def separate_ringing(runs: SettingsTable, rig: Rig) -> dict[int, SlowMotion]:
+    """Separate the ringing of flexible rods from the motion of the body on its spring.
 
-    None for a rigid rod, and where the two oscillations are not `SEPARATION` apart or one of them does not
-    oscillate.
+    Args:
+        runs: a table whose runs are released at the angle of the spring's end. Runs that are separated get a
+            rigid rod and their slow motion, in place.
+
+    Returns:
+        The separated runs by place: without rigid rods, and runs whose two oscillations are not `SEPARATION`
+        apart or do not both oscillate.
     """
-    linear = None if run.rod_twist is None else _TwoMasses.of(run, run.rod_twist, rig)
-    roots = None if linear is None else linear.roots()
-    if linear is None or roots is None:
-        return None
-    root, fast = roots
-    leads = lead, _ = linear.lead(root), linear.lead(fast)
-    end = spring_end_angle(run)
+    places = [place for place, rod in enumerate(runs.rod_twist) if rod is not None]
+    if not places:
+        return {}
+    rods = [rod for rod in runs.rod_twist if rod is not None]
+    some = SettingsTable.empty(len(places))
+    some.numbers[:] = runs.numbers[places]
+    with np.errstate(all="ignore"):  # a fit may try any law
+        linear = _TwoMasses.of(some, rods, rig)
+        root, fast, able = linear.roots()
+        lead, fast_lead = linear.lead(root), linear.lead(fast)
+        end = some["release_angle"]
+        released = end * (1.0 + some.spring_stiffness * np.array([rod.compliance for rod in rods]))
+        # a moment on the body does work on the body's angle
+        body = 1.0 + lead.real
+        strained = linear.rod * lead.real**2
+        inertia = (linear.spring + strained - linear.air * body**2) / np.abs(root) ** 2
+    able &= inertia > 0.0
+    rows = np.flatnonzero(able)
+    root, fast, lead, fast_lead = (one[rows] for one in (root, fast, lead, fast_lead))
+    inertia, body, end = inertia[rows], body[rows], end[rows]
     # Amplitudes of two oscillations that add up to the release's angle, its rate, the twist and its rate.
-    rows = [(1.0, 1.0), roots, leads, (root * lead, fast * leads[1])]
-    matrix = [[part for value in row for part in (value.real, -value.imag)] for row in rows]
-    state = np.array((end, run.release_rate, run.release_angle - end, 0.0))
-    found = np.linalg.solve(np.array(matrix), state).tolist()
-    slow, ringing = complex(found[0], found[1]), complex(found[2], found[3])
-    body = 1.0 + lead.real
-    air = linear.air * body**2  # a moment on the body does work on the body's angle
-    strained = linear.rod * lead.real**2
-    inertia = (linear.spring + strained - air) / abs(root) ** 2
-    if not inertia > 0.0:
-        return None
-    rigid = run.table.copy()
-    rigid.rod_twist[0], rigid["yaw_inertia"][0] = None, inertia
-    rigid["mechanical_damping"][0] = -2.0 * root.real * inertia + linear.air_damping * body**2
-    rigid["release_angle"][0], rigid["release_rate"][0] = slow.real, (root * slow).real
-    responses: tuple[Response, ...] = ()
-    if (drive := run.drive) is not None:
-        of_slow, of_fast = (linear.residue(one, on_body=drive.on_body) for one in roots)
-        of_slow -= (body if drive.on_body else 1.0) / (2j * root.imag * inertia)  # integrated already
-        responses = Response(drive, root, of_slow), Response(drive, fast, of_fast)
-    return SlowMotion(rigid.row(0), lead.real, strained, run.release_angle, Ringing(ringing, fast, responses))
+    pairs = [(np.ones_like(root),) * 2, (root, fast), (lead, fast_lead), (root * lead, fast * fast_lead)]
+    matrix = np.stack([np.stack([a.real, -a.imag, b.real, -b.imag], axis=1) for a, b in pairs], axis=1)
+    state = np.stack([end, some["release_rate"][rows], released[rows] - end, np.zeros_like(end)], axis=1)
+    parts = np.linalg.solve(matrix, state[:, :, None])[:, :, 0]
+    slow, ringing = parts[:, 0] + 1j * parts[:, 1], parts[:, 2] + 1j * parts[:, 3]
+    at = np.array(places)[rows]
+    runs["yaw_inertia"][at] = inertia
+    damping = -2.0 * root.real * inertia + linear.air_damping[rows] * body**2
+    runs["mechanical_damping"][at] = damping
+    runs["release_angle"][at], runs["release_rate"][at] = slow.real, (root * slow).real
+    found = {}
+    for number, (row, place) in enumerate(zip(rows.tolist(), at.tolist(), strict=True)):
+        runs.rod_twist[place] = None
+        responses: tuple[Response, ...] = ()
+        if (drive := runs.drive[place]) is not None:
+            own, one = linear.row(row), slice(number, number + 1)
+            slow_part = Response.of(own, drive, root[one], lead[one])
+            # integrated already
+            moved = body[number] if drive.on_body else 1.0
+            integrated = moved / (2j * slow_part.root.imag * inertia[number])
+            slow_part = replace(slow_part, residue=slow_part.residue - integrated)
+            responses = slow_part, Response.of(own, drive, fast[one], fast_lead[one])
+        found[place] = SlowMotion(
+            float(lead[number].real),
+            float(strained[row]),
+            float(released[row]),
+            Ringing(complex(ringing[number]), complex(fast[number]), responses),
+        )
+    return found
 
 
-def _upper_root(inertia: complex, damping: complex, stiffness: complex) -> complex:
-    """The root of inertia s² + damping s + stiffness with the larger imaginary part, 1/s."""
+def _upper_root(
+    inertia: _Complex | float, damping: _Complex | Array, stiffness: _Complex | Array
+) -> _Complex:
+    """The roots of inertia s² + damping s + stiffness with the larger imaginary part, 1/s."""
     half = damping / (2.0 * inertia)
-    return -half + 1j * cmath.sqrt(stiffness / inertia - half * half)
+    root: _Complex = -half + 1j * np.sqrt(np.asarray(stiffness / inertia - half * half, complex))
+    return root
