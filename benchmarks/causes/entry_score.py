@@ -139,14 +139,12 @@ def figures(cases: Sequence[Case]) -> dict[str, Any]:
     Args:
         cases: truth and answer of every campaign; at least one.
     """
-    found = found_by_group(cases)[-1].to_json_dict()  # the last group is of all
-    found.pop("group", None)
     given = [(c.probability, c.right) for c in cases if c.probability is not None]
     error, bins = calibration([p for p, _ in given], [right for _, right in given])
     seconds = [c.answer.seconds or 0.0 for c in cases]
     return {
         "campaigns": len(cases),
-        **found,
+        **as_json(found_by_group(cases)["all"]),
         "log_score": log_score(cases),
         "inclusion_calibration": as_json(smooth_calibration(inclusions(cases))),
         "answer_calibration": {"error": error, "bins": as_json(bins)},
@@ -206,7 +204,7 @@ def score(
         "answered": len(every),
         "of": len(key["truths"]),
         "all": figures(every),
-        "scatter": as_json(scatter_score(every)) if any(c.scatter.widths for c in every) else None,
+        "scatter": as_json(scatter_score(every)) if any(c.widths for c in every) else None,
         "found_of_nameable": Proportion.of(nameable).to_json_dict(),
         "tracks": tracks,
         "cases": {
