@@ -90,8 +90,8 @@ def sweep(
     workers = crew(jobs, scheduler, plan.shards)
     with bar("cases", plan.size) as progress:
         _, outcome = run_in(plan.experiment, out, workers, progress)
-    if outcome.found:
-        say(f"{outcome.found} of {counted(plan.shards, 'shard')} finished before")
+    if outcome.finished_before:
+        say(f"{outcome.finished_before} of {counted(plan.shards, 'shard')} finished before")
     estimates = plan.size * len(plan.document.estimators)
     sizes = (plan.size, "case"), (plan.runs, "run"), (estimates, "estimate")
     say(f"Written: {out} ({', '.join(counted(*size) for size in sizes)})")

@@ -285,7 +285,7 @@ def _first_difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
 class CommandOutcome:
     """The outcome of a command: the number of tasks finished before it, and the estimates that failed during it."""
 
-    found: int
+    finished_before: int
     failed: tuple[Failed, ...] = ()
 
 

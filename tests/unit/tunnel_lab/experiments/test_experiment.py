@@ -60,7 +60,7 @@ def test_killed_and_resumed_is_the_same_to_the_bit(small: Path, sweep: Sweep, he
     finished = {path: path.stat().st_mtime_ns for path in (tmp_path / "killed").glob("results/part-*")}
     assert 0 < len(finished) < sweep.shards, "killed too late to say anything"
     _, outcome = run_in(sweep.experiment, tmp_path / "killed", here)
-    assert outcome.found == len(finished)
+    assert outcome.finished_before == len(finished)
     assert {path: path.stat().st_mtime_ns for path in finished} == finished  # nothing was done twice
     assert contents(tmp_path / "killed") == contents(tmp_path / "whole")
     cases = open_store(tmp_path / "killed").scan().select("case").collect()["case"]
@@ -144,7 +144,7 @@ def test_half_a_part_is_done_again(sweep: Sweep, here, tmp_path: Path) -> None:
     part.write_bytes(part.read_bytes()[:-100])  # a disk that was full, or lost its power
     names_of_the_dead(part.with_name("part-00005.parquet"))[0].write_bytes(b"PAR1")
     assert "part-00004" not in store.finished()
-    assert run_in(sweep.experiment, tmp_path / "out", here)[1].found == 11
+    assert run_in(sweep.experiment, tmp_path / "out", here)[1].finished_before == 11
     assert contents(tmp_path / "out") == whole
 
 
@@ -159,7 +159,7 @@ def test_a_changed_file_is_refused_and_a_comment_is_no_change(sweep: Sweep, here
         with pytest.raises(TunnelError, match=said):
             run_in(read_sweep(tmp_path / "changed.toml").experiment, tmp_path / "out", here)
     (tmp_path / "same.toml").write_text("# a comment\n" + SMALL.replace("0.0002", "2e-4"), encoding="utf-8")
-    assert run_in(read_sweep(tmp_path / "same.toml").experiment, tmp_path / "out", here)[1].found == 12
+    assert run_in(read_sweep(tmp_path / "same.toml").experiment, tmp_path / "out", here)[1].finished_before == 12
     assert contents(tmp_path / "out") == before
 
 
@@ -235,7 +235,7 @@ def test_a_part_damaged_anywhere_is_done_again(sweep: Sweep, here, tmp_path: Pat
     for dataset in ("results", "records", "checksums"):
         for _ in damages(*sorted((tmp_path / "out" / dataset).iterdir())[:2]):
             assert store.finished() == set(map(sweep.experiment.name, range(1, sweep.shards)))
-            assert run_in(sweep.experiment, tmp_path / "out", here)[1].found == sweep.shards - 1
+            assert run_in(sweep.experiment, tmp_path / "out", here)[1].finished_before == sweep.shards - 1
             assert contents(tmp_path / "out") == whole
 
 
