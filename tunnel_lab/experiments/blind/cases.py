@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 from diagnosis.answer.run_deviations import Spread
 from diagnosis.findings.decision import Decision
@@ -26,36 +26,42 @@ MODERATE = (1.0, 10.0)
 """Excess of a moderate gap: 1 to 10 noise variances."""
 
 
-class _Scale(BaseModel):
+class ScaleTable(BaseModel):
+    """The scale of a rig."""
+
     model_config = ConfigDict(strict=True, allow_inf_nan=False)
 
-    time: float = 1.0
+    time: float = Field(default=1.0, description="time over the standard rig's, a ratio")
 
 
 class CampaignTruth(BaseModel):
-    """The scored part of a truth, from the key; the rest is ignored.
-
-    ``effects`` act and are to be found, ``small`` effects need not be. ``scatter`` has the widths drawn, and
-    ``repeatability`` the widths that the campaign states, both relative and by quantity. With a lag of the air,
-    ``in_phase`` has Cnβ and Cnr in phase with angle and rate (decision 0004).
-    """
+    """The scored part of a truth, as the key states it; the rest is ignored."""
 
     model_config = ConfigDict(strict=True, allow_inf_nan=False)
 
-    effects: list[str]
-    small: list[str] = []
-    severity: float | None = None
-    cn_beta: float | None = None
-    cn_r: float | None = None
-    in_phase: dict[str, float] = {}
-    scatter: dict[str, NotNegative] = {}
-    scatter_level: str = ""
-    scatter_form: str = "normal"
-    repeatability: dict[str, NotNegative] = {}
-    scale: _Scale = _Scale()
-    few_runs: bool = False
-    coloured_share: float = 0.0
-    stamps: str = "even"
+    effects: list[str] = Field(description="effects that act and are to be found")
+    small: list[str] = Field(default=[], description="effects that act but need not be found")
+    severity: float | None = Field(
+        default=None, description="excess of the nominal model as a ratio to the noise variance"
+    )
+    cn_beta: float | None = Field(default=None, description="Cnβ, 1/rad")
+    cn_r: float | None = Field(default=None, description="Cnr, 1/rad")
+    in_phase: dict[str, float] = Field(
+        default={},
+        description="with a lag of the air, Cnβ and Cnr in phase with angle and rate (decision 0004)",
+    )
+    scatter: dict[str, NotNegative] = Field(
+        default={}, description="relative standard deviations between the runs, by quantity"
+    )
+    scatter_level: str = Field(default="", description="level of these widths, such as small")
+    scatter_form: str = Field(default="normal", description="form of their distribution")
+    repeatability: dict[str, NotNegative] = Field(
+        default={}, description="widths that the campaign states, relative, by quantity"
+    )
+    scale: ScaleTable = ScaleTable()
+    few_runs: bool = Field(default=False, description="whether there are few springs and speeds")
+    coloured_share: float = Field(default=0.0, description="share of coloured noise in the sensor's variance")
+    stamps: str = Field(default="even", description="even, rounded or jittered")
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ from tunnel_lab.experiments.blind.cases import (
 from tunnel_lab.experiments.blind.scatter_score import ScatterScore, scatter_score
 from tunnel_lab.experiments.blind.sets import (
     KEY,
+    MADE_WITH,
     SEAL,
     MadeWith,
     campaign_folders,
@@ -353,7 +354,7 @@ class BlindScore:
             "sealed": self.sealed,
             "key_sha256": self.key_sha256,
             "answers_sha256": self.answers_sha256,
-            "made_with": {} if self.made_with is None else self.made_with.model_dump(),
+            "made_with": {} if self.made_with is None else as_json(self.made_with),
             "excluded": list(self.excluded),
             "exact": as_json(self.exact()),
             "confusion": self.confusion(),
@@ -418,7 +419,7 @@ def score_set(
             )
         with as_described("is not a key", shown(source), "name the key with --key"):
             truths, given = dict(document["truths"]), document["made_with"]
-            made_with = MadeWith.model_validate(given) if given else None
+            made_with = MADE_WITH.validate_python(given) if given else None
     else:
         open_truth = "seal the set (tunnel blind make) or put a truth.json into every campaign"
         truths = {path.name: read_json(path / "truth.json", remedy=open_truth) for path in campaigns}

@@ -9,10 +9,11 @@ from __future__ import annotations
 import hashlib
 import secrets
 from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel
+from pydantic import TypeAdapter
 
 from tunnel_lab.experiments.runner import Progress
 from tunnel_reference.draw import DEFAULT_SHARES, Mixture, redraw
@@ -32,7 +33,8 @@ KEY = "key.json"
 _CAMPAIGN = "campaign.toml"
 
 
-class MadeWith(BaseModel):
+@dataclass(frozen=True)
+class MadeWith:
     """The arguments of `make_blind` in the key; the defaults are for keys of earlier versions."""
 
     count: int
@@ -52,8 +54,14 @@ class MadeWith(BaseModel):
     @classmethod
     def of(cls, count: int, seed: int, kinds: Mapping[str, float], mixture: Mixture) -> MadeWith:
         """The arguments as the key states them."""
-        shares = vars(mixture) | {"scatter_level": mixture.level, "scatter_normal": mixture.normal}
-        return cls.model_validate({**shares, "count": count, "seed": seed, "kinds": dict(kinds)})
+        names = {"level": "scatter_level", "normal": "scatter_normal"}
+        known = {one.name for one in fields(cls)}
+        given = {names.get(name, name): value for name, value in vars(mixture).items()}
+        shares = {name: value for name, value in given.items() if name in known}
+        return cls(count, seed, dict(kinds), **shares)
+
+
+MADE_WITH = TypeAdapter(MadeWith)
 
 
 def write_document(path: Path, document: Mapping[str, Any]) -> str:
@@ -164,7 +172,7 @@ def make_blind(
         document = {
             "schema_version": SCHEMA_VERSION,
             "salt": secrets.token_hex(32),
-            "made_with": MadeWith.of(count, seed, shares, mixture).model_dump(),
+            "made_with": asdict(MadeWith.of(count, seed, shares, mixture)),
             "truths": truths,
         }
         sealed = write_document(partial / KEY if key is None else key, document)

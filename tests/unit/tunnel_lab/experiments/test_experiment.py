@@ -159,7 +159,9 @@ def test_a_changed_file_is_refused_and_a_comment_is_no_change(sweep: Sweep, here
         with pytest.raises(TunnelError, match=said):
             run_in(read_sweep(tmp_path / "changed.toml").experiment, tmp_path / "out", here)
     (tmp_path / "same.toml").write_text("# a comment\n" + SMALL.replace("0.0002", "2e-4"), encoding="utf-8")
-    assert run_in(read_sweep(tmp_path / "same.toml").experiment, tmp_path / "out", here)[1].finished_before == 12
+    assert (
+        run_in(read_sweep(tmp_path / "same.toml").experiment, tmp_path / "out", here)[1].finished_before == 12
+    )
     assert contents(tmp_path / "out") == before
 
 
