@@ -66,12 +66,7 @@ def likely_sets(answer: Mapping[str, Any]) -> list[tuple[tuple[str, ...], float]
 
 
 def as_case(name: str, truth: Mapping[str, Any], answer: Mapping[str, Any]) -> Case:
-    """Truth and answer of a campaign in the form of the blind checks.
-
-    Args:
-        truth: truth from the key.
-        answer: an entry's document.
-    """
+    """Truth and answer of a campaign in the form of the blind checks."""
     seconds = float(answer.get("seconds", 0.0))
     if answer["causes"] is None:
         return case(name, truth, ScoredAnswer(seconds=seconds))
@@ -164,11 +159,8 @@ def score(
     """The score of an entry, as a file of ``results``.
 
     Args:
-        folder: folder of the set.
         key: document of the key, as returned by `benchmarks.causes.make.check`.
         answers: answers by campaign; campaigns without an answer are not scored, and their number is stated.
-        name: name of the method.
-        about: description of the method.
 
     Raises:
         TunnelError: when an answer is for a campaign outside the set.

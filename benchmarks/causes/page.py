@@ -54,25 +54,16 @@ def _share(given: Mapping[str, Any]) -> float:
     return given["count"] / given["total"] if given["total"] else 0.0
 
 
-def write_page(results: Path = RESULTS, page: Path = PAGE, figure: Path = FIGURE) -> Path:
-    """Write page and figure.
-
-    Args:
-        results: folder of the results.
-        page: file of the page.
-        figure: file of the figure.
-
-    Returns:
-        The page's file.
-    """
-    found = read_results(results)
-    scattering = read_results(results / f"v{_SCATTERING}", _SCATTERING)
-    _draw(found, figure)
-    text = page_text(found, f"images/{figure.name}", scattering)
-    page.write_text(
-        text if not page.exists() else as_stamped(text, page.read_text("utf-8")), encoding="utf-8"
+def write_page() -> Path:
+    """Write page and figure, and return the page's file."""
+    found = read_results(RESULTS)
+    scattering = read_results(RESULTS / f"v{_SCATTERING}", _SCATTERING)
+    _draw(found, FIGURE)
+    text = page_text(found, f"images/{FIGURE.name}", scattering)
+    PAGE.write_text(
+        text if not PAGE.exists() else as_stamped(text, PAGE.read_text("utf-8")), encoding="utf-8"
     )
-    return page
+    return PAGE
 
 
 def page_text(
