@@ -260,7 +260,7 @@ def sweep_file(folder: Path, draw: Draw) -> None:
 
 def sweep_folder(folder: Path, draw: Draw) -> None:
     """``sweep.json`` or a part of the results changed, as a sweep that goes on or is summed up meets it."""
-    from tunnel_lab.experiments.sweep import open_store
+    from tests.support.small_sweep import open_store
     from tunnel_lab.experiments.sweep_view import overall_table, summarise
 
     files = dict(seeds.sweep_folder())

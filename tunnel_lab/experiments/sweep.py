@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from identification.estimators import free_decay_estimators
-from tunnel_lab.experiments.experiment import RESULTS, Experiment, Parts, read_manifest
+from tunnel_lab.experiments.experiment import RESULTS, Experiment, read_manifest
 from tunnel_lab.experiments.sweep_cases import SweepCases
 from tunnel_lab.experiments.sweep_tables import (
     SweepDocument,
@@ -200,8 +200,3 @@ def stored_sweep(folder: Path) -> Sweep:
         TunnelError: when it does not hold a sweep, or the sweep is malformed or of another format version.
     """
     return Sweep.from_json(json.dumps(read_manifest("sweep", folder)["sweep"]))
-
-
-def open_store(folder: Path) -> Parts[int]:
-    """The results in the folder of a sweep; errors as in `stored_sweep`."""
-    return Parts(folder, stored_sweep(folder).experiment)

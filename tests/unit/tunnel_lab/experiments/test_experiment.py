@@ -17,12 +17,12 @@ import polars as pl
 import pytest
 
 from tests.support.killed import names_of_the_dead
-from tests.support.small_sweep import SMALL, contents
+from tests.support.small_sweep import SMALL, contents, open_store
 from tunnel_lab.experiments import experiment as engine
 from tunnel_lab.experiments import sweep_work
 from tunnel_lab.experiments.experiment import begin, run_in
 from tunnel_lab.experiments.runner import processes
-from tunnel_lab.experiments.sweep import Sweep, open_store, read_sweep
+from tunnel_lab.experiments.sweep import Sweep, read_sweep
 from tunnel_sim.vocabulary.errors import TunnelError
 
 ROOT = Path(__file__).parents[4]
