@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from tunnel_lab.experiments.experiment import Parts
-from tunnel_lab.experiments.sweep import stored_sweep
+from tunnel_lab.experiments.sweep import stored_sweep, sweep_of
 
 SMALL = """
 name = "small"
@@ -48,4 +48,4 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 def open_store(folder: Path) -> Parts[int]:
     """The results in the folder of a sweep."""
-    return Parts(folder, stored_sweep(folder).experiment)
+    return Parts(folder, sweep_of(stored_sweep(folder)))

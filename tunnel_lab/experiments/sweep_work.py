@@ -22,7 +22,7 @@ from tunnel_lab.experiments.estimate_rows import (
     quantity_rows,
 )
 from tunnel_lab.experiments.experiment import RESULTS, Done, parquet
-from tunnel_lab.experiments.sweep_cases import SweepCase, SweepCases
+from tunnel_lab.experiments.sweep_cases import Sweep, SweepCase
 from tunnel_lab.terminal.arguments import NO_EFFECT
 from tunnel_sim.effects import BetweenRuns, effect_class, effect_from
 from tunnel_sim.vocabulary.between_runs import SCATTERED, Scatter
@@ -70,7 +70,7 @@ RECORD_COLUMNS: Mapping[str, Any] = {
 _estimator = lru_cache(maxsize=16)(make_estimator)
 
 
-def run_shard(sweep: SweepCases, index: int, nthread: int = 1) -> Done:
+def run_shard(sweep: Sweep, index: int, nthread: int = 1) -> Done:
     """Simulate the cases of a shard together, and estimate them one by one.
 
     Args:
