@@ -105,15 +105,15 @@ def counted_failures(failures: Iterable[Failed]) -> tuple[Failed, ...]:
     return tuple(one for one in found.values() if one.status in VERBS)
 
 
-def failures_in(table: pl.DataFrame, by: Sequence[str], seen: Iterable[Failed]) -> tuple[Failed, ...]:
+def failures_in(table: pl.DataFrame, by: Sequence[str], known: Iterable[Failed]) -> tuple[Failed, ...]:
     """The failures in a table of results, also from an earlier command.
 
     Args:
         table: table with ``estimator``, ``status`` and ``message``.
         by: the columns that name a campaign.
-        seen: failures of this command, with known details.
+        known: failures of this command, with their details.
     """
-    first = {(one.estimator, one.status): one.first for one in seen}
+    first = {(one.estimator, one.status): one.first for one in known}
     kind = pl.col("status").str.split(" ").list.first()
     found = (
         table.with_columns(kind=kind)
