@@ -24,7 +24,7 @@ from identification import identify
 from identification.estimators.neural_posterior import NeuralPosterior
 from identification.neural.posterior import distribution, forward, variances
 from identification.neural.rivals import CAMPAIGN_NAMES, RECORD_NAMES
-from tunnel_lab.experiments.training import INPUTS, FitSpec, fit, losses, start_state, usable
+from tunnel_lab.experiments.training import INPUTS, ShardedTraining, fit, losses, start_state, usable
 from tunnel_lab.experiments.training_samples import read_samples
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, SensorProperties
@@ -119,7 +119,7 @@ def curve_rows(folder: Path, steps: int) -> Iterator[Row]:
     """The loss on tuning samples of campaign networks fitted to increasing numbers of shards."""
     shards = len(list(folder.glob("campaigns/training-*")))
     apart = usable(read_samples(folder, "campaigns", "tuning"))
-    spec = FitSpec(steps=steps)
+    spec = ShardedTraining(steps=steps)
     counts = sorted({max(1, shards // 4), max(1, shards // 2)})
     for count in counts:
         samples = usable(read_samples(folder, "campaigns", "training", count))
