@@ -1,7 +1,7 @@
 """An experiment: a table of tasks, a pure function of a task, and the folder of its results.
 
-A kind of experiment is a class in its own file, such as `sweep`, `score` and `breakdown`. Folder, versions,
-resumption, workers and progress are the same for all kinds, and are here and in `runner`.
+A kind of experiment is a function in its own file, such as `sweep_of`, `score_of` and `breakdown_of`. Folder,
+versions, resumption, workers and progress are the same for all kinds, and are here and in `runner`.
 
 A folder has a manifest, such as ``sweep.json``, with the description of the experiment and the versions of the
 code. Every finished task has a Parquet file in each dataset, named for the task. Files are written under a
