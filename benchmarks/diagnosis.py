@@ -17,7 +17,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from mujoco import rollout, sysid
+from mujoco import sysid
 from rich.console import Console
 from rich.table import Table
 
@@ -146,7 +146,8 @@ class SysidFit:
         mapping = sysid.TimeSeries.compute_all_sensor_mapping(model.mj)
         reading = np.zeros((times.size, model.mj.nsensordata))
         reading[:, 0] = run.reading
-        control = sysid.TimeSeries(times, np.zeros((times.size, 0)))
+        # a row of the sensors has the values at the start of its step: the last row needs a further step
+        control = sysid.TimeSeries(STEP * np.arange(times.size + 1), np.zeros((times.size + 1, 0)))
         sensors = sysid.TimeSeries(times, reading, mapping)
         return sysid.ModelSequences(run.id, model.spec, run.id, self._state(model), control, sensors)
 
@@ -166,32 +167,13 @@ class SysidFit:
         ]  # fmt: skip
         return [r for part in found for r in part[0]], [], []
 
-    def _rollout(self, index: int, *, models: Any, datas: Any, param_dicts: Any, **given: Any) -> list[Any]:
+    def _rollout(self, index: int, *, models: Any, param_dicts: Any, **given: Any) -> Any:
         settings = [self._settings(params, index) for params in param_dicts]
         states = [
             self._state(dataclasses.replace(self.models[index], mj=model, settings=one))
             for model, one in zip(models, settings, strict=True)
         ]
-        count = self._runs[index].reading.size
-        moved, _ = rollout.rollout(models, datas, np.stack(states), nstep=count - 1)
-        angle_at = 1 + self.models[index].yaw_address  # the state begins with the time
-        found = []
-        for k, model in enumerate(models):
-            state = np.vstack([states[k], moved[k]])
-            # after a step the sensors have the values at its start, and the state has the values at its end
-            data = np.zeros((count, model.nsensordata))
-            data[:, 0] = state[:, angle_at]
-            times = STEP * np.arange(count)
-            found.append(
-                sysid.SystemTrajectory(
-                    model=model,
-                    control=given["control_signal"][0],
-                    sensordata=sysid.TimeSeries(times, data, given["rollout_signal_mapping"]),
-                    initial_state=states[k],
-                    state=sysid.TimeSeries(times, state, given["rollout_state_mapping"]),
-                )
-            )
-        return found
+        return sysid.sysid_rollout(models, **{**given, "initial_states": np.stack(states)})
 
     def _difference(
         self, index: int, params: Any, predicted: Any, record: Any
@@ -199,10 +181,10 @@ class SysidFit:
         common, own = self._values(params, index)
         run = self._runs[index]
         chain = self.problem.chain(common, own, run)
-        angle = chain.angle(predicted.data[:, 0], predicted.times)
+        angle = chain.angle(predicted.data[:, 0], record.times)
         reading = chain.reading(angle + common[self.problem.names.index("zero")])
-        left = (record.data[:, 0] - reading) / run.noise.scale
-        return left[:, None], predicted, record
+        residual = (record.data[:, 0] - reading) / run.noise.scale
+        return residual[:, None], predicted, record
 
     def optimise(self) -> tuple[float, float]:
         """Seconds and final χ², from the same start as the diagnosis's own fit."""

@@ -24,7 +24,7 @@ from identification import identify
 from identification.estimators.neural_posterior import NeuralPosterior
 from identification.neural.posterior import distribution, forward, variances
 from identification.neural.rivals import CAMPAIGN_NAMES, RECORD_NAMES
-from tunnel_lab.experiments.training import INPUTS, FitSpec, fit, losses, start_state, usable
+from tunnel_lab.experiments.training import INPUTS, ShardedTraining, fit, losses, start_state, usable
 from tunnel_lab.experiments.training_samples import read_samples
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, SensorProperties
@@ -119,7 +119,7 @@ def curve_rows(folder: Path, steps: int) -> Iterator[Row]:
     """The loss on tuning samples of campaign networks fitted to increasing numbers of shards."""
     shards = len(list(folder.glob("campaigns/training-*")))
     apart = usable(read_samples(folder, "campaigns", "tuning"))
-    spec = FitSpec(steps=steps)
+    spec = ShardedTraining(steps=steps)
     counts = sorted({max(1, shards // 4), max(1, shards // 2)})
     for count in counts:
         samples = usable(read_samples(folder, "campaigns", "training", count))
@@ -248,7 +248,7 @@ def _off(row: Row) -> bool:
     return any(abs(one["error"]) > FAR * one["std"] for one in own)
 
 
-def kept(rows: Iterable[Row], path: Path) -> list[Row]:
+def written(rows: Iterable[Row], path: Path) -> list[Row]:
     """Write rows immediately, replacing an earlier table of the same name."""
     found = []
     with path.open("w") as file:
@@ -278,15 +278,15 @@ def main() -> None:
     if options.what == "show":
         rows = [json.loads(line) for path in options.folders for line in path.read_text().splitlines()]
     elif options.what == "clean":
-        rows = kept(clean_rows(options.records, options.seed), options.out)
+        rows = written(clean_rows(options.records, options.seed), options.out)
         console.print(f"{batch_milliseconds():.1f} ms per record in a batch of 100")
     elif options.what == "calibration":
-        rows = kept(calibration_rows(options.folders[0]), options.out)
+        rows = written(calibration_rows(options.folders[0]), options.out)
     elif options.what == "curve":
-        rows = kept(curve_rows(options.folders[0], options.steps), options.out)
+        rows = written(curve_rows(options.folders[0], options.steps), options.out)
     else:
         found = (row for folder in options.folders for row in blind_rows(folder, options.kinds.split(",")))
-        rows = kept(found, options.out)
+        rows = written(found, options.out)
     show_clean(console, [row for row in rows if "cell" in row])
     show_blind(console, [row for row in rows if "campaign" in row])
     show_calibration(console, [row for row in rows if "place" in row])

@@ -92,7 +92,7 @@ RIG = """
 def by_sysid(time: np.ndarray, yaw: np.ndarray, rate: float) -> tuple[float, float]:
     """mujoco.sysid on a hinge of unit inertia: stiffness, damping, release and zero, at the record's time step."""
     import mujoco
-    from mujoco import rollout, sysid
+    from mujoco import sysid
 
     state_kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
     spec = mujoco.MjSpec.from_string(RIG)
@@ -105,9 +105,11 @@ def by_sysid(time: np.ndarray, yaw: np.ndarray, rate: float) -> tuple[float, flo
         low = 0.0 if name == "damping" else -1e4
         params.add(sysid.Parameter(name, float(value), low, 1e4))
     mapping = sysid.TimeSeries.compute_all_sensor_mapping(model)
+    # a row of the sensors has the values at the start of its step: the last row needs a further step
+    control = sysid.TimeSeries(np.append(time, time[-1] + 1.0 / rate), np.zeros((time.size + 1, 0)))
     sequence = sysid.ModelSequences(
-        "run", spec, "run", np.zeros(mujoco.mj_stateSize(model, state_kind)),
-        sysid.TimeSeries(time, np.zeros((time.size, 0))), sysid.TimeSeries(time, yaw[:, None], mapping),
+        "run", spec, "run", np.zeros(mujoco.mj_stateSize(model, state_kind)), control,
+        sysid.TimeSeries(time, yaw[:, None], mapping),
     )  # fmt: skip
 
     def build(given: sysid.ParameterDict, _spec: mujoco.MjSpec) -> mujoco.MjModel:
@@ -115,25 +117,13 @@ def by_sysid(time: np.ndarray, yaw: np.ndarray, rate: float) -> tuple[float, flo
         made.jnt_stiffness[0], made.dof_damping[0] = given["stiffness"].value[0], given["damping"].value[0]
         return made
 
-    def roll(*, models: list, datas: list, param_dicts: list, **given: object) -> list:
-        states = [np.array([0.0, p["angle"].value[0], p["rate"].value[0]]) for p in param_dicts]
-        moved, _ = rollout.rollout(models, datas, np.stack(states), nstep=time.size - 1)
-        found = []
-        for one, begin, path in zip(models, states, moved, strict=True):
-            whole = np.vstack((begin, path))
-            reading = sysid.TimeSeries(time, whole[:, 1:2], given["rollout_signal_mapping"])
-            motion = sysid.TimeSeries(time, whole, given["rollout_state_mapping"])
-            found.append(
-                sysid.SystemTrajectory(
-                    model=one, control=given["control_signal"][0], sensordata=reading, initial_state=begin,
-                    state=motion,
-                )
-            )  # fmt: skip
-        return found
+    def roll(*, param_dicts: list, **given: object) -> object:
+        starts = [np.array([0.0, p["angle"].value[0], p["rate"].value[0]]) for p in param_dicts]
+        return sysid.sysid_rollout(**{**given, "initial_states": np.stack(starts)})
 
     def difference(given: sysid.ParameterDict, predicted, record, *_a: object, **_k: object):
-        left = record.data[:, 0] - predicted.data[:, 0] - given["zero"].value[0]
-        return left[:, None], predicted, record
+        residual = record.data[:, 0] - predicted.data[:, 0] - given["zero"].value[0]
+        return residual[:, None], predicted, record
 
     residual = partial(
         sysid.residual, models_sequences=[sequence], build_model=build, custom_rollout=roll,

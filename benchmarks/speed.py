@@ -52,21 +52,41 @@ print(json.dumps({"seconds": seconds, "peak": peak, "causes": list(answer.causes
 """
 
 
-def timed(tree: Path, folder: Path) -> dict[str, Any]:
-    """One diagnosis of a campaign's folder with the code of a tree: seconds, MiB, and causes."""
+def python_of(tree: Path) -> str:
+    """The interpreter of a tree."""
     own = tree / ".venv/bin/python"
-    python = str(own) if own.exists() else sys.executable
+    return str(own) if own.exists() else sys.executable
+
+
+def printed(tree: Path, code: str, *arguments: str) -> str:
+    """The last line of output of some code in a tree."""
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     done = subprocess.run(
-        [python, "-c", TIMED, str(folder)],
-        cwd=tree,
-        env=environment,
-        check=True,
-        capture_output=True,
-        text=True,
-    )
-    found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+        [python_of(tree), "-c", code, *arguments],
+        cwd=tree, env=environment, check=True, capture_output=True, text=True,
+    )  # fmt: skip
+    return done.stdout.splitlines()[-1] if done.stdout else ""
+
+
+def timed(tree: Path, folder: Path, *model: str) -> dict[str, Any]:
+    """One diagnosis of a campaign's folder with the code of a tree: seconds, MiB, and causes.
+
+    Args:
+        model: file and joint of the user's model; empty: none.
+    """
+    found: dict[str, Any] = json.loads(printed(tree, TIMED, str(folder), *model))
     return found
+
+
+def arguments_of(prog: str, description: str | None) -> argparse.ArgumentParser:
+    """The options of a comparison of two trees."""
+    parser = argparse.ArgumentParser(
+        prog=prog, description=description, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("old", type=Path, metavar="OLD", help="a tree of the code before")
+    parser.add_argument("new", type=Path, metavar="NEW", help="a tree of the code after")
+    parser.add_argument("--turns", type=int, default=5, help="turns of every job (default: 5)")
+    return parser
 
 
 def compared(name: str, folder: Path, trees: list[Path], turns: int) -> list[str]:
@@ -91,15 +111,8 @@ def compared(name: str, folder: Path, trees: list[Path], turns: int) -> list[str
 
 def main() -> None:
     """Measure all jobs and print a table."""
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.speed",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.add_argument("old", type=Path, metavar="OLD", help="a tree of the code before")
-    parser.add_argument("new", type=Path, metavar="NEW", help="a tree of the code after")
+    parser = arguments_of(prog="python -m benchmarks.speed", description=__doc__)
     parser.add_argument("--campaign", type=Path, action="append", default=[], help="a further folder; repeat")
-    parser.add_argument("--turns", type=int, default=5, help="turns of every job (default: 5)")
     parser.add_argument("--only", default="", help="jobs whose names contain this")
     asked = parser.parse_args()
     trees = [asked.old.resolve(), asked.new.resolve()]

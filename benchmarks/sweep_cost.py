@@ -99,11 +99,11 @@ def sweep(file: Path, out: Path, workers: int, threads: int) -> dict[str, float]
     wall, cpu = time.perf_counter(), time.process_time()
     from tunnel_lab.experiments.experiment import run_in
     from tunnel_lab.experiments.runner import processes
-    from tunnel_lab.experiments.sweep import read_sweep
+    from tunnel_lab.experiments.sweep import read_sweep, sweep_of
     from tunnel_lab.experiments.sweep_work import run_shard
 
     plan = read_sweep(file)
-    experiment = plan.experiment
+    experiment = sweep_of(plan)
     if threads > 1:
         experiment = replace(experiment, work=partial(run_shard, plan, nthread=threads))
     run_in(experiment, out, processes(0 if threads > 1 else workers, print))

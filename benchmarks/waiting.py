@@ -6,10 +6,8 @@ process in the measured tree, with the tree's own environment if it has one.
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import json
-import os
 import subprocess
 import sys
 import tempfile
@@ -23,7 +21,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.speed import TIMED
+from benchmarks.speed import arguments_of, printed, python_of, timed
 from tunnel_reference.draw import CampaignDraw, EffectDraw, draw_conditions
 from tunnel_reference.forms import FORMS
 from tunnel_reference.make import as_campaign
@@ -141,22 +139,6 @@ class Measurement:
     of: Callable[[Path], float]
 
 
-def python_of(tree: Path) -> str:
-    """The interpreter of a tree."""
-    own = tree / ".venv/bin/python"
-    return str(own) if own.exists() else sys.executable
-
-
-def printed(tree: Path, code: str, *arguments: str) -> str:
-    """The last line of output of some code in a tree."""
-    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    done = subprocess.run(
-        [python_of(tree), "-c", code, *arguments],
-        cwd=tree, env=environment, check=True, capture_output=True, text=True,
-    )  # fmt: skip
-    return done.stdout.splitlines()[-1] if done.stdout else ""
-
-
 def elapsed(command: list[str], tree: Path) -> float:
     """Wall time of a command in a tree, s; status 1 also counts as an answer."""
     begun = time.perf_counter()
@@ -213,7 +195,7 @@ def diagnosed(name: str, folder: Path, *model: str) -> Iterator[Measurement]:
     cache: dict[Path, dict[str, float]] = {}
 
     def seconds(tree: Path) -> float:
-        cache[tree] = json.loads(printed(tree, TIMED, str(folder), *model))
+        cache[tree] = timed(tree, folder, *model)
         return cache[tree]["seconds"]
 
     yield Measurement(name, "CPU s", seconds)
@@ -248,7 +230,7 @@ def percentile(folders: list[Path]) -> Iterator[Measurement]:
     """The 90th percentile of the processor seconds over a set."""
 
     def seconds(tree: Path) -> float:
-        taken = [json.loads(printed(tree, TIMED, str(folder)))["seconds"] for folder in folders]
+        taken = [timed(tree, folder)["seconds"] for folder in folders]
         return float(np.quantile(taken, 0.9))
 
     yield Measurement(f"90th percentile of {len(folders)} campaigns", "CPU s", seconds)
@@ -286,13 +268,7 @@ def on_paper(tree: Path, folder: Path, rate: float) -> list[str]:
 
 def main() -> None:
     """Measure all jobs and print two tables."""
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.waiting",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.add_argument("old", type=Path, metavar="OLD", help="a tree of the code before")
-    parser.add_argument("new", type=Path, metavar="NEW", help="a tree of the code after")
+    parser = arguments_of(prog="python -m benchmarks.waiting", description=__doc__)
     parser.add_argument(
         "--campaign", type=Path, action="append", default=[], help="a folder to diagnose; repeat"
     )
@@ -307,7 +283,6 @@ def main() -> None:
     parser.add_argument(
         "--paper", type=Path, action="append", default=[], help="a folder for the limit; repeat"
     )
-    parser.add_argument("--turns", type=int, default=5, help="turns of every job (default: 5)")
     asked = parser.parse_args()
     trees = [asked.old.resolve(), asked.new.resolve()]
     table = Table(title=f"Medians of {asked.turns} turns")

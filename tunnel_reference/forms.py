@@ -37,8 +37,6 @@ def families(*, driven: bool, edition: int = EDITION) -> tuple[str, ...]:
 
 FAMILIES = families(driven=False)
 """The families of free decays."""
-DRIVEN_FAMILIES = families(driven=True)
-"""The families of driven runs."""
 
 
 def forms_of(family: str, edition: int = EDITION) -> tuple[Form, ...]:

@@ -74,13 +74,13 @@ class ErrorEvidence:
 
     Args:
         log: log evidence for every ``ETA``, shape (36,).
-        left: expected power of the model's error beside the parameters, over the power of the gap, shape (36,).
+        error_share: expected share of the gap that the model's error has beside the parameters, shape (36,).
         alone: residual χ² of the parameters without any error of the model.
         occam: log of the posterior's volume over the prior's.
     """
 
     log: Array
-    left: Array
+    error_share: Array
     alone: float
     occam: float
 

@@ -85,9 +85,7 @@ def answer_all(
 
     Args:
         answer: function of one campaign's folder.
-        campaigns: folder of the campaigns.
         answers: folder of the answers; an interrupted run is continued.
-        jobs: number of processes.
         first: number of campaigns to answer, in the order of names; None: all.
 
     Returns:

@@ -66,12 +66,7 @@ def likely_sets(answer: Mapping[str, Any]) -> list[tuple[tuple[str, ...], float]
 
 
 def as_case(name: str, truth: Mapping[str, Any], answer: Mapping[str, Any]) -> Case:
-    """Truth and answer of a campaign in the form of the blind checks.
-
-    Args:
-        truth: truth from the key.
-        answer: an entry's document.
-    """
+    """Truth and answer of a campaign in the form of the blind checks."""
     seconds = float(answer.get("seconds", 0.0))
     if answer["causes"] is None:
         return case(name, truth, ScoredAnswer(seconds=seconds))
@@ -139,14 +134,12 @@ def figures(cases: Sequence[Case]) -> dict[str, Any]:
     Args:
         cases: truth and answer of every campaign; at least one.
     """
-    found = found_by_group(cases)[-1].to_json_dict()  # the last group is of all
-    found.pop("group", None)
     given = [(c.probability, c.right) for c in cases if c.probability is not None]
     error, bins = calibration([p for p, _ in given], [right for _, right in given])
     seconds = [c.answer.seconds or 0.0 for c in cases]
     return {
         "campaigns": len(cases),
-        **found,
+        **as_json(found_by_group(cases)["all"]),
         "log_score": log_score(cases),
         "inclusion_calibration": as_json(smooth_calibration(inclusions(cases))),
         "answer_calibration": {"error": error, "bins": as_json(bins)},
@@ -166,11 +159,8 @@ def score(
     """The score of an entry, as a file of ``results``.
 
     Args:
-        folder: folder of the set.
         key: document of the key, as returned by `benchmarks.causes.make.check`.
         answers: answers by campaign; campaigns without an answer are not scored, and their number is stated.
-        name: name of the method.
-        about: description of the method.
 
     Raises:
         TunnelError: when an answer is for a campaign outside the set.
@@ -206,7 +196,7 @@ def score(
         "answered": len(every),
         "of": len(key["truths"]),
         "all": figures(every),
-        "scatter": as_json(scatter_score(every)) if any(c.scatter.widths for c in every) else None,
+        "scatter": as_json(scatter_score(every)) if any(c.widths for c in every) else None,
         "found_of_nameable": Proportion.of(nameable).to_json_dict(),
         "tracks": tracks,
         "cases": {

@@ -44,11 +44,7 @@ class FittedCauses:
         return {n: {"value": self.fit.value(n), "std": self.fit.std(n)} for n in have}
 
     def with_one_more(self, name: str) -> FittedCauses | None:
-        """The fit with a further cause, in its textbook form; None where it cannot be fitted.
-
-        Args:
-            name: name of the cause.
-        """
+        """The fit with a further cause, in its textbook form; None where it cannot be fitted."""
         kind = {kind.name: kind for kind in KINDS}[name]
         found = one_more(self.fit, kind)
         return None if found is None else _fitted((*self.names, name), found)
@@ -56,9 +52,6 @@ class FittedCauses:
 
 def nominal(folder: Path) -> tuple[FittedCauses, tuple[str, ...], bool]:
     """The nominal model fitted to a campaign.
-
-    Args:
-        folder: folder of the campaign.
 
     Returns:
         The fit; causes detected in the records before any fit (hum and a coarse step); and whether a gap is
@@ -92,9 +85,6 @@ class Grown:
 
 def grown(folder: Path) -> Grown:
     """All fits of `tunnel diagnose` to a campaign, before its own weights.
-
-    Args:
-        folder: folder of the campaign.
 
     Raises:
         TunnelError: when the records are refused.

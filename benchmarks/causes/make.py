@@ -46,11 +46,9 @@ def make(
     """Make a set; an interrupted set is continued.
 
     Args:
-        out: folder of the set.
         version: version of the set, a key of ``EDITIONS``.
         seed: seed of all random numbers; equal arguments give equal numbers. None: the seed of the version.
         counts: number of campaigns by track; None: the numbers of the version.
-        jobs: number of processes.
         salt: random text in the key, which prevents finding its hash by trying truths; None: derived from the
             seed, as in the published set, so that everyone can make its key.
 
@@ -133,11 +131,7 @@ def _copy_records(target: Path) -> dict[str, Any]:
 
 
 def data_hash(folder: Path) -> str:
-    """SHA-256 over the statements of a campaign and the numbers of its runs, in hexadecimal.
-
-    Args:
-        folder: folder of one campaign.
-    """
+    """SHA-256 over the statements of a campaign and the numbers of its runs, in hexadecimal."""
     found = hashlib.sha256((folder / "campaign.toml").read_bytes())
     for path in sorted((folder / "runs").iterdir()):
         found.update(path.stem.encode() + b"\0")
@@ -156,7 +150,6 @@ def check(folder: Path, published: Path | None = None) -> dict[str, Any]:
     """Check a set against its seal, and open its key.
 
     Args:
-        folder: folder of the set.
         published: a seal with the required campaigns of the set; None: none. Its key may differ in the last
             digits of severities, which depend on the linear algebra library.
 
@@ -186,7 +179,6 @@ def differing(seal: Mapping[str, Any], published: Path) -> list[str]:
     """Names of the campaigns with hashes that differ from the published ones.
 
     Args:
-        seal: seal of a set.
         published: file of the published seal of a version.
     """
     other, own = read_json(published, remedy="restore it")["campaigns_sha256"], seal["campaigns_sha256"]
@@ -194,11 +186,7 @@ def differing(seal: Mapping[str, Any], published: Path) -> list[str]:
 
 
 def truths_by_track(key: Mapping[str, Any]) -> dict[str, list[str]]:
-    """Names of campaigns by track, in the order of the tracks.
-
-    Args:
-        key: document of the key.
-    """
+    """Names of campaigns by track, in the order of the tracks."""
     found: dict[str, list[str]] = {
         name: [] for name in (*(n for e in EDITIONS.values() for n in e.tracks), REAL)
     }

@@ -91,12 +91,12 @@ class ToolboxFit:
     causes: tuple[str, ...]
     names: tuple[str, ...]
     x: Array
-    left: Array
+    residuals: Array
     jacobian: Array
 
     @property
     def chi2(self) -> float:
-        return float(self.left @ self.left)
+        return float(self.residuals @ self.residuals)
 
 
 class ToolboxRig:
@@ -238,7 +238,6 @@ class ToolboxRig:
         """Fit by the toolbox.
 
         Args:
-            causes: names of the causes.
             names: names of the parameters of the rig.
             x: starting values of these parameters and of two for each release.
         """

@@ -252,12 +252,8 @@ class Regression:
         """Mean square of the residual in noise variances."""
         return float(self.target @ self.target) / self.target.size
 
-    def left(self, names: Sequence[str]) -> float:
-        """Residual mean square with causes.
-
-        Args:
-            names: names of the causes.
-        """
+    def unexplained(self, names: Sequence[str]) -> float:
+        """Residual mean square with causes."""
         if not names:
             return self.gap
         columns = np.column_stack([self.causes[name] for name in names])
@@ -272,5 +268,5 @@ class Regression:
         """
         if self.gap < DETECTED:
             return []
-        closed = (self.gap - self.left(named)) / (self.gap - 1.0)
+        closed = (self.gap - self.unexplained(named)) / (self.gap - 1.0)
         return list(named) if named and closed > CLOSED else ["unknown"]

@@ -49,11 +49,7 @@ class Classifier:
         return dict(zip(LABELS, np.mean(found, axis=0).tolist(), strict=True))
 
     def save(self, path: Path) -> None:
-        """Write the classifier as safetensors.
-
-        Args:
-            path: path of the file, ``.safetensors``.
-        """
+        """Write the classifier as safetensors."""
         from safetensors.numpy import save_file
 
         given = {
@@ -66,9 +62,6 @@ class Classifier:
 
 def read_classifier(path: Path = WEIGHTS) -> Classifier:
     """Read a trained classifier.
-
-    Args:
-        path: path of the file.
 
     Raises:
         TunnelError: when the file is missing or is not a classifier.

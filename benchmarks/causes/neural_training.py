@@ -151,10 +151,7 @@ def trained(
     A network stops at the least loss on its held-out fold. The temperature is optimal on the held-out folds.
 
     Args:
-        samples: samples of the training campaigns.
         seed: seed of folds, first weights and order.
-        settings: settings to try.
-        epochs: maximum number of epochs.
 
     Returns:
         The classifier, without the facts of the simulation.

@@ -54,47 +54,38 @@ def _share(given: Mapping[str, Any]) -> float:
     return given["count"] / given["total"] if given["total"] else 0.0
 
 
-def write_page(results: Path = RESULTS, page: Path = PAGE, figure: Path = FIGURE) -> Path:
-    """Write page and figure.
-
-    Args:
-        results: folder of the results.
-        page: file of the page.
-        figure: file of the figure.
-
-    Returns:
-        The page's file.
-    """
-    found = read_results(results)
-    scattering = read_results(results / f"v{_SCATTERING}", _SCATTERING)
-    _draw(found, figure)
-    text = page_text(found, f"images/{figure.name}", scattering)
-    page.write_text(
-        text if not page.exists() else as_stamped(text, page.read_text("utf-8")), encoding="utf-8"
+def write_page() -> Path:
+    """Write page and figure, and return the page's file."""
+    found = read_results(RESULTS)
+    scattering = read_results(RESULTS / f"v{_SCATTERING}", _SCATTERING)
+    _draw(found, FIGURE)
+    text = page_text(found, f"images/{FIGURE.name}", scattering)
+    PAGE.write_text(
+        text if not PAGE.exists() else as_stamped(text, PAGE.read_text("utf-8")), encoding="utf-8"
     )
-    return page
+    return PAGE
 
 
 def page_text(
-    found: Sequence[Mapping[str, Any]], image: str, scattering: Sequence[Mapping[str, Any]] = ()
+    results: Sequence[Mapping[str, Any]], image: str, scattering: Sequence[Mapping[str, Any]] = ()
 ) -> str:
     """The page.
 
     Args:
-        found: results, best first.
+        results: best first.
         image: address of the figure.
         scattering: results on the campaigns with runs that do not repeat, best first.
     """
     parts = [
         "# Benchmark of causes\n",
-        *_where_others_win(found),
+        *_where_others_win(results),
         f"\nThe set has {sum(t.count for t in TRACKS.values())} simulated campaigns (version {VERSION}, "
         f"seed {SEED}) and "
         "the packaged measured records. [How it is made, and how to enter](../benchmarks/causes/README.md). "
-        f"`python -m benchmarks.causes page` writes this page from answers scored {_scored(found)}; nothing in "
+        f"`python -m benchmarks.causes page` writes this page from answers scored {_scored(results)}; nothing in "
         "it is typed by hand. Intervals are Wilson's at 95 %. A method that cannot see a track has “–”.\n",
         "## Sets exactly right\n",
-        _table(("method", "all", *(t.replace("_", " ") for t in _TRACKS)), [_exact(r) for r in found]),
+        _table(("method", "all", *(t.replace("_", " ") for t in _TRACKS)), [_exact(r) for r in results]),
         f"\n![Sets exactly right by method, with intervals]({image})\n",
         "## Causes, probabilities and time\n",
         _table(
@@ -109,32 +100,32 @@ def page_text(
                 "its size",
                 "s of processor, median",
             ),
-            [_causes(r) for r in found],
+            [_causes(r) for r in results],
         ),
         "\nThe log score is the mean over campaigns of the log probability of what acts and what does "
         "not; 0 is best, and "
         "probabilities count as at least 0.01. The 90 % set is the smallest set of answers that together "
         "have nine tenths. "
         "The calibration error is the smooth one of the blind check.\n",
-        *_coefficients_table(found),
+        *_coefficients_table(results),
         *_scatter_table(scattering),
         "\n## The methods\n",
         "The columns and the threshold that LISDD's recipe, the spike-and-slab regression and PySINDy use were "
         "chosen with knowledge of the truths of the first 40 campaigns; no other setting was tuned on the set, "
         "unless its row says so.\n",
-        *[_about(r, found) for r in found],
-        *[_about(r, scattering) for r in scattering if r["method"] not in {one["method"] for one in found}],
+        *[_about(r, results) for r in results],
+        *[_about(r, scattering) for r in scattering if r["method"] not in {one["method"] for one in results}],
     ]
     return "\n".join(parts).rstrip() + "\n"
 
 
-def _where_others_win(found: Sequence[Mapping[str, Any]]) -> list[str]:
+def _where_others_win(results: Sequence[Mapping[str, Any]]) -> list[str]:
     """Tracks and scores in which another method is better than ours on the campaigns that both answered."""
-    ours = next((r for r in found if r["method"] == OURS), None)
+    ours = next((r for r in results if r["method"] == OURS), None)
     if ours is None:
         return ["`tunnel diagnose` has not been run on this set yet."]
     said = []
-    for r in found:
+    for r in results:
         both = sorted(set(r["cases"]) & set(ours["cases"])) if r is not ours else []
         other, mine = _right(r, both), _right(ours, both)
         if other > mine:
@@ -205,13 +196,13 @@ def _causes(r: Mapping[str, Any]) -> list[str]:
     ]  # fmt: skip
 
 
-def _scatter_table(found: Sequence[Mapping[str, Any]]) -> list[str]:
+def _scatter_table(results: Sequence[Mapping[str, Any]]) -> list[str]:
     """Campaigns with runs that do not repeat exactly; nothing without results."""
-    if not found:
+    if not results:
         return []
     edition = EDITIONS[_SCATTERING]
     rows = []
-    for r in found:
+    for r in results:
         tracks = [_proportion(r["tracks"].get(t, {}).get("exact"), interval=False) for t in edition.tracks]
         scatter = r["scatter"] or {}
         told = [
@@ -223,28 +214,28 @@ def _scatter_table(found: Sequence[Mapping[str, Any]]) -> list[str]:
         "method", "all", *(t.replace("_", " ") for t in edition.tracks), "scatter named, nothing else",
         "as stated: nothing named", "named where runs repeat",
     )  # fmt: skip
-    others = "".join(map(_other_set, found))
+    others = "".join(map(_other_set, results))
     return [
         "\n## Runs that do not repeat exactly\n",
         f"Version {_SCATTERING} of the set (seed {edition.seed}) has {sum(edition.counts.values())} campaigns. In "
         "most of them wind speed, springs or damping differ from run to run by chance. Sets are exact whether "
-        f"scatter is named or not; how it is named stands beside them. The answers were scored {_scored(found)}."
+        f"scatter is named or not; how it is named stands beside them. The answers were scored {_scored(results)}."
         + others
-        + ("" if OURS in [r["method"] for r in found] else " `tunnel diagnose` has not been run on it yet.")
+        + ("" if OURS in [r["method"] for r in results] else " `tunnel diagnose` has not been run on it yet.")
         + "\n",
         _table(heads, rows),
     ]
 
 
-def _scored(found: Sequence[Mapping[str, Any]]) -> str:
+def _scored(results: Sequence[Mapping[str, Any]]) -> str:
     """The days on which the answers were scored."""
-    days = sorted({date.fromisoformat(r["scored"]) for r in found})
+    days = sorted({date.fromisoformat(r["scored"]) for r in results})
     first, last = (f"{day.day} {day:%B %Y}" for day in (days[0], days[-1]))
     return f"on {first}" if first == last else f"from {first} to {last}"
 
 
-def _coefficients_table(found: Sequence[Mapping[str, Any]]) -> list[str]:
-    rows = [row for r in found if (row := _coefficients(r))]
+def _coefficients_table(results: Sequence[Mapping[str, Any]]) -> list[str]:
+    rows = [row for r in results if (row := _coefficients(r))]
     if not rows:
         return []
     heads = (
@@ -267,8 +258,8 @@ def _coefficients(r: Mapping[str, Any]) -> list[str]:
     return row
 
 
-def _about(r: Mapping[str, Any], found: Sequence[Mapping[str, Any]]) -> str:
-    ours = next((one for one in found if one["method"] == OURS and r["answered"] < r["of"]), None)
+def _about(r: Mapping[str, Any], results: Sequence[Mapping[str, Any]]) -> str:
+    ours = next((one for one in results if one["method"] == OURS and r["answered"] < r["of"]), None)
     both = sorted(set(r["cases"]) & set(ours["cases"])) if ours is not None else []
     same = "" if ours is None else (
         f" On the {len(both)} campaigns that both answered it has {_right(r, both)} exact sets, and "
@@ -305,21 +296,21 @@ def _other_set(r: Mapping[str, Any]) -> str:
     )
 
 
-def _draw(found: Sequence[Mapping[str, Any]], path: Path) -> None:
+def _draw(results: Sequence[Mapping[str, Any]], path: Path) -> None:
     """A point with its interval for each method."""
     from matplotlib.figure import Figure
 
     from identification.show.style import save
 
-    figure = Figure(figsize=(6.4, 0.6 + 0.32 * len(found)), layout="constrained")
+    figure = Figure(figsize=(6.4, 0.6 + 0.32 * len(results)), layout="constrained")
     axes = figure.subplots()
-    for place, r in enumerate(reversed(found)):
+    for place, r in enumerate(reversed(results)):
         given = r["all"]["exact"]
         low, high = given["wilson_95"]
         colour = "C0" if r["method"] == OURS else "0.35"
         axes.plot([100 * low, 100 * high], [place, place], color=colour, linewidth=2)
         axes.plot([100 * _share(given)], [place], "o", color=colour)
-    axes.set_yticks(range(len(found)), [_title(r) for r in reversed(found)])
+    axes.set_yticks(range(len(results)), [_title(r) for r in reversed(results)])
     axes.set_xlim(0, 100)
     axes.set_xlabel("sets exactly right, %")
     save(figure, path)

@@ -22,9 +22,6 @@ _FLOOR = 1e-6
 def summaries(campaign: Campaign) -> tuple[Array, Array]:
     """The summary statistics of a campaign.
 
-    Args:
-        campaign: campaign of free decays.
-
     Returns:
         Statistics of every run, shape (runs, k), and of all runs together, shape (m,), dimensionless.
     """

@@ -32,15 +32,13 @@ class Named(Protocol):
 
 @dataclass(frozen=True)
 class RunParameterPrior:
-    """Prior of a run's own parameter: a normal distribution.
+    """Prior of a run's own parameter: a normal distribution about zero.
 
     Args:
         std: standard deviation, in the parameter's unit.
-        mean: mean, in the parameter's unit.
     """
 
     std: float
-    mean: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -142,8 +140,7 @@ class ParameterSet:
 
     def pull(self, point: Point) -> Array:
         """Half the fall of `surprise` with each own parameter, shape (runs, own)."""
-        means = np.array([0.0 if one.prior is None else one.prior.mean for one in self.own])
-        return np.asarray(self.precision * (means - point.per_run), np.float64)
+        return np.asarray(self.precision * (0.0 - point.per_run), np.float64)
 
     def surprise(self, point: Point) -> float:
         """Distance of the own parameters from their priors, in variances, summed; a part of χ²."""

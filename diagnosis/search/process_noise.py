@@ -86,11 +86,6 @@ class ProcessNoise:
         """Drop of −2 ln L of all runs, dimensionless."""
         return float(self.drops.sum())
 
-    @property
-    def sources(self) -> frozenset[MomentSource]:
-        """The sources of its parts."""
-        return frozenset(part.source for part in self.spectrum)
-
     def price(self, of_part: float) -> float:
         """Price of −2 ln L beyond one part without a centre, ``of_part`` for each further one; dimensionless."""
         centres = sum(part.centre > 0.0 for part in self.spectrum)

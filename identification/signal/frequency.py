@@ -69,18 +69,12 @@ class SpectralPeak:
     prominence: float
 
 
-def psd_peak(record: Record, *, padding: int = _PADDING, falling: bool = False) -> SpectralPeak:
+def psd_peak(record: Record) -> SpectralPeak:
     """The damped frequency, as the peak of the power spectral density of the record without its mean.
 
     A Hann window keeps the offset and the negative frequencies from leaking into the peak.
-
-    Args:
-        padding: minimum length after zero padding, in lengths of the record; 1 is faster, and sufficient to
-            start a fit of many cycles.
-        falling: whether the window falls from the start of the record instead of rising first: it then captures
-            a decay that ends long before the record does.
     """
-    frequency, power = _spectral_peak(record, padding, falling)
+    frequency, power = _spectral_peak(record, _PADDING, falling=False)
     highest = float(power[:-1].max(initial=0.0))
     return SpectralPeak(frequency, highest / max(float(np.median(power)), 1e-300) if frequency else 0.0)
 
@@ -107,7 +101,7 @@ def psd_peak_std(record: Record, frequency: float, noise_std: float) -> float:
     return noise_std * sqrt(float(inner(moved, moved))) / abs(float(curvature)) / (2.0 * np.pi)
 
 
-def _spectral_peak(record: Record, padding: int, falling: bool) -> tuple[float, Array]:
+def _spectral_peak(record: Record, padding: int, *, falling: bool) -> tuple[float, Array]:
     """The frequency of `psd_peak`, Hz, and the power from one cycle per record on, shape (n,)."""
     if not holds_motion(record):
         return 0.0, np.zeros(1)
@@ -215,7 +209,7 @@ def _find_frequency(record: Record) -> float | None:
     thin = record
     if factor > 1:
         thin = Record(mean_of_blocks(record.time_s, factor), mean_of_blocks(record.yaw_rad, factor))
-    frequency, _ = _spectral_peak(thin, padding=8 if factor == 1 else 1, falling=True)
+    frequency, _ = _spectral_peak(thin, _PADDING if factor == 1 else 1, falling=True)
     return _strongest_decay(evenly_spaced(record, bridged=False), frequency) or None
 
 

@@ -61,7 +61,6 @@ def damped_sinusoid_bound(
     frequency: float,
     zeta: float,
     noise_std: float,
-    offset_known: bool = False,
 ) -> SinusoidBound:
     """The bound for y = A e^{−σt} cos(2πf t + φ) + offset + noise, all five unknown.
 
@@ -83,9 +82,8 @@ def damped_sinusoid_bound(
     angle = amplitude * np.cos(phase)
     rate = -decay.rate * angle - omega_d * amplitude * np.sin(phase)
     information = information_at(time, decay, float(angle), float(rate))
-    kept = [0, 1, 3, 4] if offset_known else [0, 1, 3, 4, 2]
-    covariance = np.zeros((5, 5))
-    covariance[: len(kept), : len(kept)] = inverse(information[np.ix_(kept, kept)]) * noise_std**2
+    order = [0, 1, 3, 4, 2]
+    covariance = inverse(information[np.ix_(order, order)]) * noise_std**2
     # Rows: amplitude, phase, f, ωn, ζ, offset. Columns: a, k, angle, rate, offset.
     a, omega = decay.rate, decay.omega_n
     damped_row = np.array([-a / omega_d, 0.5 / omega_d, 0.0, 0.0, 0.0])

@@ -165,16 +165,16 @@ def springs_csv() -> bytes:
 def sweep_folder() -> dict[str, bytes]:
     """The files of a sweep of which three shards of twelve are finished."""
     from tunnel_lab.experiments.experiment import begin
-    from tunnel_lab.experiments.sweep import read_sweep
+    from tunnel_lab.experiments.sweep import read_sweep, sweep_of
     from tunnel_lab.experiments.sweep_work import run_shard
 
     with tempfile.TemporaryDirectory() as name:
         file = Path(name) / "sweep.toml"
         file.write_text(SMALL.replace("records = true", "records = false"), encoding="utf-8")
         sweep = read_sweep(file)
-        store = begin(sweep.experiment, Path(name) / "out")
+        store = begin(sweep_of(sweep), Path(name) / "out")
         for index in range(3):
-            store.keep(sweep.experiment.name(index), run_shard(sweep, index))
+            store.keep(sweep_of(sweep).name(index), run_shard(sweep, index))
         return {
             str(path.relative_to(store.folder)): path.read_bytes()
             for path in sorted(store.folder.rglob("*"))

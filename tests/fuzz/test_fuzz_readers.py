@@ -252,15 +252,15 @@ def blind_answers(folder: Path, draw: Draw) -> None:
 def sweep_file(folder: Path, draw: Draw) -> None:
     """A sweep file changed, and its folder begun where it is accepted."""
     from tunnel_lab.experiments.experiment import begin
-    from tunnel_lab.experiments.sweep import read_sweep
+    from tunnel_lab.experiments.sweep import read_sweep, sweep_of
 
     sweep = read_sweep(written(folder / "sweep.toml", draw(spoilt_toml(seeds.SMALL.encode())), draw))
-    begin(sweep.experiment, folder / "out")
+    begin(sweep_of(sweep), folder / "out")
 
 
 def sweep_folder(folder: Path, draw: Draw) -> None:
     """``sweep.json`` or a part of the results changed, as a sweep that goes on or is summed up meets it."""
-    from tunnel_lab.experiments.sweep import open_store
+    from tests.support.small_sweep import open_store
     from tunnel_lab.experiments.sweep_view import overall_table, summarise
 
     files = dict(seeds.sweep_folder())

@@ -15,7 +15,7 @@ from tunnel_reference import make
 from tunnel_reference import moments as m
 from tunnel_reference.draw import CampaignDraw, EffectDraw, Mixture, draw_campaign
 from tunnel_reference.driven_inputs import linear_response
-from tunnel_reference.forms import DRIVEN_FAMILIES, FAMILIES, FORMS
+from tunnel_reference.forms import FAMILIES, FORMS, families
 from tunnel_reference.forms_actuators import ACTUATORS
 from tunnel_reference.integrator import BoundLaw, Phase, integrate
 from tunnel_reference.nominal_fit import fit_driven
@@ -120,11 +120,11 @@ def test_driven_draws_drive_some_run_and_keep_the_others(seed):
     free = ~c.drive.driven
     assert np.all(c.drive.values[:, free] == 0.0)
     assert np.all(c.start_rate[free] == 0.0)
-    assert drawn.effects[0].form.family in DRIVEN_FAMILIES
+    assert drawn.effects[0].form.family in families(driven=True)
 
 
 def test_driven_families_are_those_that_a_driven_run_can_show():
-    assert set(DRIVEN_FAMILIES) == set(FAMILIES) | {"input_delay"} | ACTUATORS
+    assert set(families(driven=True)) == set(FAMILIES) | {"input_delay"} | ACTUATORS
 
 
 @pytest.mark.parametrize("column", ["moment_nm", "drive", "base_rad", "base_acceleration_rad_s2"])

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from tunnel_lab.experiments.experiment import Parts
+from tunnel_lab.experiments.sweep import stored_sweep, sweep_of
+
 SMALL = """
 name = "small"
 seed = 1
@@ -41,3 +44,8 @@ def contents(folder: Path) -> dict[str, bytes]:
         for path in sorted(folder.rglob("*"))
         if path.is_file()
     }
+
+
+def open_store(folder: Path) -> Parts[int]:
+    """The results in the folder of a sweep."""
+    return Parts(folder, sweep_of(stored_sweep(folder)))

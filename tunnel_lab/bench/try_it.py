@@ -123,12 +123,12 @@ class TryItPage:
             while shown != self._trial:
                 shown = self._trial
                 with self._fault.around():
-                    time, nominal, seen = await asyncio.to_thread(simulate, shown)
+                    time, nominal, affected = await asyncio.to_thread(simulate, shown)
                     if self._chart.is_deleted:  # the page was left
                         return
-                    self._chart.show([time.tolist(), nominal.tolist(), seen.tolist()])
-                    self._words.set_text(trial_sentence(shown, time, nominal, seen))
-                    self._car.show(time[::4].tolist(), seen[::4].tolist())
+                    self._chart.show([time.tolist(), nominal.tolist(), affected.tolist()])
+                    self._words.set_text(trial_sentence(shown, time, nominal, affected))
+                    self._car.show(time[::4].tolist(), affected[::4].tolist())
         finally:
             self._busy = False
 
@@ -212,9 +212,9 @@ def simulate(trial: RigTrial) -> tuple[Array, Array, Array]:
             remedy = "choose a stiffer spring or a smaller Cnβ"
             raise TunnelError(str(error), where="the rig", remedy=remedy) from error
         records.append(read_motion(motion, sensor, rng, chain))
-    nominal, seen = records[0].yaw_rad, records[-1].yaw_rad
-    size = min(nominal.size, seen.size)  # an effect may drop samples
-    return records[0].time_s[:size], nominal[:size], seen[:size]
+    nominal, affected = records[0].yaw_rad, records[-1].yaw_rad
+    size = min(nominal.size, affected.size)  # an effect may drop samples
+    return records[0].time_s[:size], nominal[:size], affected[:size]
 
 
 def plan_text(trial: RigTrial, name: str) -> str:
@@ -243,13 +243,13 @@ def effect_words(trial: RigTrial) -> list[str]:
     return ["--effect", f"{effect.name}:{values}"]
 
 
-def trial_sentence(trial: RigTrial, time: Array, nominal: Array, seen: Array) -> str:
+def trial_sentence(trial: RigTrial, time: Array, nominal: Array, affected: Array) -> str:
     """A sentence on the result of the trial.
 
     Args:
         time: times, s, shape (n,).
         nominal: reading of the nominal model, rad, shape (n,).
-        seen: reading with the effect, rad, shape (n,).
+        affected: reading with the effect, rad, shape (n,).
     """
     crossings = np.flatnonzero(np.diff(np.sign(nominal)) != 0)
     parts = []
@@ -257,6 +257,6 @@ def trial_sentence(trial: RigTrial, time: Array, nominal: Array, seen: Array) ->
         half = float(np.mean(np.diff(time[crossings])))
         parts.append(f"The nominal model swings at {0.5 / half:.3g} Hz.")
     if trial.effect and trial.severity:
-        apart = degrees(float(np.sqrt(np.mean((seen - nominal) ** 2))))
+        apart = degrees(float(np.sqrt(np.mean((affected - nominal) ** 2))))
         parts.append(f"With the effect the reading differs by {apart:.2g}° in root mean square.")
     return " ".join(parts)

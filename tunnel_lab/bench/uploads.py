@@ -41,12 +41,12 @@ def too_large(size: int) -> str:
     return f"{size / 1e6:.0f} MB are more than the {most}; use tunnel import, or drop fewer files at a time"
 
 
-def drop_zone(url: str, kept: Callable[[str], Awaitable[None] | None], fault: Fault) -> None:
+def drop_zone(url: str, saved: Callable[[str], Awaitable[None] | None], fault: Fault) -> None:
     """A zone to drop or choose files; a refusal is shown as a fault.
 
     Args:
         url: address for the files.
-        kept: function called with the address of the files' page when all are saved.
+        saved: function called with the address of the files' page when all are saved.
     """
     most = UPLOAD_BYTES - 1_000_000  # less the frame of the request
     label = f"Drop files here, or press + to choose (at most {UPLOAD_BYTES / 1e6:.0f} MB)"
@@ -56,7 +56,7 @@ def drop_zone(url: str, kept: Callable[[str], Awaitable[None] | None], fault: Fa
 
     async def taken(answer: str) -> None:
         with fault.around():
-            done = kept(answer)
+            done = saved(answer)
             if done is not None:
                 await done
 

@@ -24,7 +24,6 @@ from tunnel_lab.terminal.outputs import say, say_written, show
 from tunnel_sim.vocabulary.errors import EXTRAS, TunnelError, did_you_mean, installing, library, shown
 
 PACKAGES = ("mujoco", "numpy", "scipy", "torch", "gymnasium", "polars", "matplotlib")
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 LARGEST_ERROR = 5.0  # largest error in the self-check, standard deviations
 _COMPILER_S = 5.0
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -102,6 +101,8 @@ def installed() -> Iterator[tuple[str, str]]:
     """Versions of the program, Python, the system and the packages; compiler, plugin, processors and threads."""
     from importlib.metadata import PackageNotFoundError, version
 
+    from tunnel_lab.experiments.experiment import ONE_THREAD
+    from tunnel_lab.experiments.runner import available_processors
     from tunnel_sim.physics.moment_law import native_library
 
     def of(name: str) -> str:
@@ -119,9 +120,8 @@ def installed() -> Iterator[tuple[str, str]]:
         yield "plugin", str(native_library("vwt_plugin"))
     except TunnelError as error:
         yield "plugin", str(error)
-    usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    yield "processors", f"{usable} usable of {os.cpu_count()}"
-    limits = [f"{name}={os.environ[name]}" for name in THREADS if name in os.environ]
+    yield "processors", f"{available_processors()} usable of {os.cpu_count()}"
+    limits = [f"{name}={os.environ[name]}" for name in ONE_THREAD if name in os.environ]
     yield "thread limits", ", ".join(limits) or "none set"
 
 

@@ -95,16 +95,12 @@ def find_faults(plan: CampaignPlan, folder: Path) -> list[str]:
     from tunnel_lab.bench.workspace import Session
     from tunnel_lab.report import write_report
     from tunnel_lab.terminal.arguments import file_hashes
-    from tunnel_sim.engine.virtual_campaign import simulate_campaign, truth_document
-    from tunnel_sim.files.campaign_folder import write_campaign
     from tunnel_sim.files.writing import write_json, write_whole
 
     files = Session(folder, CAMPAIGN)  # named as on the bench, which can open them
     text = (resources.files("tunnel_lab") / "data" / PLAN).read_text(encoding="utf-8")
     text = re.sub(r"(?m)^seed = \d+", f"seed = {plan.seed}", text, count=1)  # keeps the comments
-    with bar("simulating runs", len(plan.conditions)) as progress:
-        campaign = simulate_campaign(plan, progress=progress)
-    write_campaign(campaign, files.campaign, truth=truth_document(plan), overwrite=True)
+    campaign = _simulated(plan, files.campaign)
     write_whole(folder / PLAN, text.encode())
     # everything is written before anything is printed: the reader of a pipe may close it early
     estimate = identify(campaign, CHECKED_ESTIMATOR, throw=False)
@@ -119,6 +115,17 @@ def find_faults(plan: CampaignPlan, folder: Path) -> list[str]:
     say(f"Records, plan and both answers (JSON) are in {folder}")
     show_next(folder)
     return missed_faults(plan, answer)
+
+
+def _simulated(plan: CampaignPlan, folder: Path) -> Campaign:
+    """Simulate a plan, and write the campaign with its truth."""
+    from tunnel_sim.engine.virtual_campaign import simulate_campaign, truth_document
+    from tunnel_sim.files.campaign_folder import write_campaign
+
+    with bar("simulating runs", len(plan.conditions)) as progress:
+        campaign = simulate_campaign(plan, progress=progress)
+    write_campaign(campaign, folder, truth=truth_document(plan), overwrite=True)
+    return campaign
 
 
 def show_faults(plan: CampaignPlan, campaign: Campaign, answer: Diagnosis) -> None:
@@ -273,13 +280,9 @@ def misses(estimates: Sequence[Estimate], plan: CampaignPlan) -> list[str]:
 def simulated_part(plan: CampaignPlan, folder: Path) -> tuple[Campaign, tuple[Estimate, ...]]:
     """Simulate, identify by the paper's two methods and the default method, and write all results to the folder."""
     from identification import identify
-    from tunnel_sim.engine.virtual_campaign import simulate_campaign, truth_document
-    from tunnel_sim.files.campaign_folder import write_campaign
     from tunnel_sim.files.writing import write_json
 
-    with bar("simulating runs", len(plan.conditions)) as progress:
-        campaign = simulate_campaign(plan, progress=progress)
-    write_campaign(campaign, folder / "campaign", truth=truth_document(plan), overwrite=True)
+    campaign = _simulated(plan, folder / "campaign")
     estimates = []
     for name in SHOWN:
         with console(stderr=True).status(f"identifying by {name}"):

@@ -84,14 +84,14 @@ def sweep(
         )
     from tunnel_lab.experiments.experiment import run_in
     from tunnel_lab.experiments.runner import crew
-    from tunnel_lab.experiments.sweep import read_sweep
+    from tunnel_lab.experiments.sweep import read_sweep, sweep_of
 
     plan = read_sweep(file, chosen_estimators(estimators))
     workers = crew(jobs, scheduler, plan.shards)
     with bar("cases", plan.size) as progress:
-        _, outcome = run_in(plan.experiment, out, workers, progress)
-    if outcome.found:
-        say(f"{outcome.found} of {counted(plan.shards, 'shard')} finished before")
+        _, outcome = run_in(sweep_of(plan), out, workers, progress)
+    if outcome.finished_before:
+        say(f"{outcome.finished_before} of {counted(plan.shards, 'shard')} finished before")
     estimates = plan.size * len(plan.document.estimators)
     sizes = (plan.size, "case"), (plan.runs, "run"), (estimates, "estimate")
     say(f"Written: {out} ({', '.join(counted(*size) for size in sizes)})")
@@ -106,11 +106,11 @@ def sweep(
 def _summarise(folder: Path) -> None:
     """Tabulate and draw the finished part of a sweep."""
     from tunnel_lab.experiments.experiment import Parts
-    from tunnel_lab.experiments.sweep import stored_sweep
+    from tunnel_lab.experiments.sweep import stored_sweep, sweep_of
     from tunnel_lab.experiments.sweep_view import sweep_view
 
     sweep = stored_sweep(folder)
-    store = Parts(folder, sweep.experiment)
+    store = Parts(folder, sweep_of(sweep))
     if not sweep.document.estimators:
         remedy = "there is no estimate to summarise"
         raise TunnelError("the sweep has no estimators", where=str(folder), remedy=remedy)

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import polars as pl
 
+from identification.estimate import PARAMETERS
 from identification.show.blocks import Paragraph, TextTable
 from identification.show.numbers import listed, significant
 from identification.show.style import figure, styled
@@ -32,6 +33,7 @@ from tunnel_lab.experiments.score_columns import (
     not_given_notes,
     trials_of,
 )
+from tunnel_lab.experiments.score_grid import ScoreTrial
 from tunnel_lab.experiments.view import ExperimentView
 from tunnel_reference.draw import CampaignDraw, EffectDraw
 from tunnel_reference.forms import forms_of
@@ -46,13 +48,10 @@ from tunnel_sim.vocabulary.plan import Truth
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from tunnel_sim.vocabulary.campaign import Campaign
-
 
 NOTHING_ADDED = "no effect"
 SEVERITIES = (1.0, 10.0)
 """Mean squared residual of the nominal refit over the noise variance, minus one."""
-QUANTITIES = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
 EFFECTS: tuple[str, ...] = tuple(
     kind.name for kind in ALL_EFFECTS if not (kind.driven or issubclass(kind, BetweenRuns))
 )
@@ -92,17 +91,13 @@ class BiasCase:
         severity: target excess, in noise variances (a ratio); 0 for no effect.
         reached: excess after the reference simulator's nominal refit, in noise variances (a ratio).
         realisation: number of the realisation, from 0.
-        bound: Cramér–Rao bound of the nominal model by quantity, SI.
-        truth: by quantity, SI; with a lag of the air, Cnβ and Cnr in phase with angle and rate.
     """
 
     effect: str
     severity: float
     reached: float
     realisation: int
-    campaign: Campaign
-    bound: dict[str, float]
-    truth: dict[str, float]
+    trial: ScoreTrial
 
 
 def conditions_of(seed: int, *, duration: float = 10.0) -> TrueConditions:
@@ -169,9 +164,11 @@ def make_cases(
                 severity=draw.effects[0].target if draw.effects else 0.0,
                 reached=simulated.excess,
                 realisation=i % realisations,
-                campaign=campaign,
-                bound={name: bound.std(name) for name in QUANTITIES},
-                truth=vars(TRUTH) | (in_phase(draw) or {}),
+                trial=ScoreTrial(
+                    campaign,
+                    truth=vars(TRUTH) | (in_phase(draw) or {}),
+                    bound={name: bound.std(name) for name in PARAMETERS},
+                ),
             )
         )
     return cases
@@ -233,7 +230,7 @@ def case_name(case: BiasCase) -> str:
 def _estimate_case(estimators: Sequence[str], case: BiasCase) -> Done:
     rows, failed = [], []
     for name in estimators:
-        answer, failure = answer_rows(name, case.campaign, case.truth, case.bound)
+        answer, failure = answer_rows(name, case.trial)
         rows += [(case.effect, case.severity, case.reached, case.realisation, *row) for row in answer]
         failed += failure
     columns = {**_CASE_COLUMNS, **ANSWER_COLUMNS, "message": pl.String}
@@ -279,7 +276,7 @@ def breakdown_view(results: pl.DataFrame) -> ExperimentView:
     """
     frame = breakdown_frame(results)
     if frame.is_empty():
-        what = f"the estimators give none of {listed([*QUANTITIES])}, whose bias a breakdown shows"
+        what = f"the estimators give none of {listed(list(PARAMETERS))}, whose bias a breakdown shows"
         raise TunnelError(what, remedy="name one that does, such as output_error")
     given = [quantity for quantity in SHOWN if quantity in set(frame["quantity"])]
     tables = [one for quantity in given for one in breakdown_tables(frame, quantity)]

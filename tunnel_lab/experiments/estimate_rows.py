@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import polars as pl
 
 from identification import identify
+from identification.estimate import UNITS
 from identification.returned import WrongReturn
 from tunnel_sim.vocabulary.errors import TunnelError, one_line, own_traceback, raised_line
 
@@ -104,15 +105,15 @@ def counted_failures(failures: Iterable[Failed]) -> tuple[Failed, ...]:
     return tuple(one for one in found.values() if one.status in VERBS)
 
 
-def failures_in(table: pl.DataFrame, by: Sequence[str], seen: Iterable[Failed]) -> tuple[Failed, ...]:
+def failures_in(table: pl.DataFrame, by: Sequence[str], known: Iterable[Failed]) -> tuple[Failed, ...]:
     """The failures in a table of results, also from an earlier command.
 
     Args:
         table: table with ``estimator``, ``status`` and ``message``.
         by: the columns that name a campaign.
-        seen: failures of this command, with known details.
+        known: failures of this command, with their details.
     """
-    first = {(one.estimator, one.status): one.first for one in seen}
+    first = {(one.estimator, one.status): one.first for one in known}
     kind = pl.col("status").str.split(" ").list.first()
     found = (
         table.with_columns(kind=kind)
@@ -132,9 +133,12 @@ QUANTITY_COLUMNS: Mapping[str, Any] = {
 """Columns of a quantity; truth, value, std and bound are in its unit."""
 
 
+QUANTITY_UNITS: Mapping[str, str] = {**UNITS, "sensor_zero": "rad", "zeta": "1", "omega_n": "rad/s"}
+
+
 def quantity_rows(
-    found: Estimate | RunEstimate | None,
-    units: Mapping[str, str],
+    estimate: Estimate | RunEstimate | None,
+    names: Iterable[str],
     truth: Mapping[str, float],
     bound: Mapping[str, float],
     status: str,
@@ -142,15 +146,15 @@ def quantity_rows(
     """A row of `QUANTITY_COLUMNS` for each quantity.
 
     Args:
-        found: the estimate; None if there is none.
-        units: units of the quantities, by name.
+        estimate: the estimate; None if there is none.
+        names: names of the quantities.
         truth: true values by quantity, in its unit; quantities without one may be left out.
         bound: Cramér–Rao bound, by quantity, in its unit.
     """
-    for name, unit in units.items():
-        quantity = getattr(found, name, None)
+    for name in names:
+        quantity = getattr(estimate, name, None)
         value, std = (None, None) if quantity is None else (quantity.value, quantity.std)
-        yield name, unit, truth.get(name), value, std, bound.get(name), status
+        yield name, QUANTITY_UNITS[name], truth.get(name), value, std, bound.get(name), status
 
 
 def not_given(table: pl.DataFrame | pl.LazyFrame) -> dict[str, tuple[str, ...]]:

@@ -1,7 +1,7 @@
 """An experiment: a table of tasks, a pure function of a task, and the folder of its results.
 
-A kind of experiment is a class in its own file, such as `sweep`, `score` and `breakdown`. Folder, versions,
-resumption, workers and progress are the same for all kinds, and are here and in `runner`.
+A kind of experiment is a function in its own file, such as `sweep_of`, `score_of` and `breakdown_of`. Folder,
+versions, resumption, workers and progress are the same for all kinds, and are here and in `runner`.
 
 A folder has a manifest, such as ``sweep.json``, with the description of the experiment and the versions of the
 code. Every finished task has a Parquet file in each dataset, named for the task. Files are written under a
@@ -285,7 +285,7 @@ def _first_difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
 class CommandOutcome:
     """The outcome of a command: the number of tasks finished before it, and the estimates that failed during it."""
 
-    found: int
+    finished_before: int
     failed: tuple[Failed, ...] = ()
 
 

@@ -12,14 +12,14 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import polars as pl
 
-from identification.estimate import UNITS
 from identification.scoring import Trials
 from tunnel_lab.experiments.estimate_rows import (
     QUANTITY_COLUMNS,
+    QUANTITY_UNITS,
     RAISED,
     Failed,
     Failure,
@@ -32,7 +32,7 @@ from tunnel_lab.experiments.estimate_rows import (
 from tunnel_lab.experiments.experiment import RESULTS, Done, Experiment, parquet, results_of
 from tunnel_lab.experiments.runner import Progress, Workers
 from tunnel_lab.experiments.score_columns import trials_of
-from tunnel_lab.experiments.score_grid import Grid
+from tunnel_lab.experiments.score_grid import Grid, ScoreTrial, draw_trial
 from tunnel_lab.terminal.arguments import NO_EFFECT
 from tunnel_sim.files.kept_process import read_apart
 from tunnel_sim.files.reading import (
@@ -48,13 +48,8 @@ from tunnel_sim.sandbox import Message
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import shown
 
-if TYPE_CHECKING:
-    from tunnel_sim.vocabulary.campaign import Campaign
-
-
 UNIT_TRIALS = 5
 """Number of trials done together; an interruption loses at most these in each process."""
-_UNITS = {**UNITS, "zeta": "1", "omega_n": "rad/s"}
 ANSWER_COLUMNS: Mapping[str, Any] = {"estimator": pl.String, **QUANTITY_COLUMNS, "milliseconds": pl.Float64}
 TRIAL_COLUMNS: Mapping[str, Any] = {**dict.fromkeys(("cell", "trial"), pl.Int64), **ANSWER_COLUMNS}
 """The columns of a table of trials; ``cell`` is the index of the grid's cell."""
@@ -92,44 +87,36 @@ def score_of(grid: Grid, estimators: tuple[str, ...]) -> Experiment[TrialBatch]:
 
 def score_unit(grid: Grid, estimators: Sequence[str], unit: TrialBatch) -> Done:
     """Every estimator on the unit's trials."""
-    from tunnel_lab.experiments.score_grid import draw_trial
-
     cell, rows, failed = grid.cells[unit.cell], [], []
     for number in range(unit.first, unit.stop):
         wanted = [name for name in estimators if number < grid.trials_for(name)]
         if wanted:
             trial = draw_trial(cell, grid.seed, number)
             for name in wanted:
-                answer, failure = answer_rows(name, trial.campaign, trial.truth, trial.bound)
+                answer, failure = answer_rows(name, trial)
                 rows += [(unit.cell, number, *row) for row in answer]
                 failed += failure
     return Done({RESULTS: parquet(rows, {**TRIAL_COLUMNS, "message": pl.String})}, counted_failures(failed))
 
 
-def answer_rows(
-    estimator: str, campaign: Campaign, truth: Mapping[str, float], bound: Mapping[str, float]
-) -> tuple[list[tuple[Any, ...]], list[Failed]]:
+def answer_rows(estimator: str, trial: ScoreTrial) -> tuple[list[tuple[Any, ...]], list[Failed]]:
     """One estimator on one campaign of known truth.
-
-    Args:
-        truth: true values by quantity, SI; ζ and ωn for the first run.
-        bound: the Cramér–Rao bound by quantity, SI; quantities without one are left out.
 
     Returns:
         A row of `ANSWER_COLUMNS` and a message for each quantity of the truth, and the failure, if any: if the
             estimator raises an exception or returns an invalid result, value and std are None.
     """
+    campaign, truth = trial.campaign, trial.truth
     begun = time.perf_counter()
     answer = asked(campaign, estimator)
     milliseconds = 1000.0 * (time.perf_counter() - begun) / len(campaign.runs)
-    units = {quantity: _UNITS[quantity] for quantity in truth}
     if isinstance(answer, Failure):
-        found, message, failed = None, answer.message, [answer.of(estimator)]
+        estimate, message, failed = None, answer.message, [answer.of(estimator)]
         status = f"{RAISED} {answer.error}" if answer.status == RAISED else answer.status
     else:
-        found, message, failed = answer.runs[0] if "zeta" in truth else answer, None, []
+        estimate, message, failed = answer.runs[0] if "zeta" in truth else answer, None, []
         status = answer.status.name.lower()
-    rows = quantity_rows(found, units, truth, bound, status)
+    rows = quantity_rows(estimate, truth, truth, trial.bound, status)
     return [(estimator, *row, milliseconds, message) for row in rows], failed
 
 
@@ -248,7 +235,9 @@ def _possible() -> pl.Expr:
     """Whether a row has its truth and status, its unit, a value with its deviation, and finite relative errors."""
     truth, value, std, bound = (pl.col(name) for name in ("truth", "value", "std", "bound"))
     complete = pl.all_horizontal(pl.col("trial", "estimator", "truth", "status").is_not_null())
-    unit = pl.col("quantity").replace_strict(_UNITS, default=None, return_dtype=pl.String) == pl.col("unit")
+    unit = pl.col("quantity").replace_strict(QUANTITY_UNITS, default=None, return_dtype=pl.String) == pl.col(
+        "unit"
+    )
     numbers = [complete, unit.fill_null(value=False), value.is_null() == std.is_null()]
     numbers += [
         (one.abs() <= limits.LARGEST_NUMBER).fill_null(value=True) for one in (truth, value, std, bound)

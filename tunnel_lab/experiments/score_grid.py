@@ -18,6 +18,7 @@ from zlib import crc32
 import numpy as np
 from pydantic import Field, TypeAdapter
 
+from identification.estimate import PARAMETERS
 from identification.estimators import free_decay_estimators
 from tunnel_lab.experiments.bounds import coefficients_bound, decay_bound, in_phase
 from tunnel_lab.terminal.arguments import NO_EFFECT, parse_effect
@@ -38,7 +39,6 @@ from tunnel_sim.vocabulary.plan import AeroDerivatives, SensorModel, Truth
 from tunnel_sim.vocabulary.rig import Rig
 
 DECAY_QUANTITIES = ("zeta", "omega_n")
-CAMPAIGN_QUANTITIES = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
 
 _LEAST_TRIALS = 2
 _ZETA_SPREAD, _FREQUENCY_SPREAD, _RELEASE_SPREAD = 0.05, 0.02, 0.03
@@ -144,7 +144,7 @@ class Cell:
     @property
     def quantities(self) -> tuple[str, ...]:
         """Names of the scored quantities in an estimate's JSON."""
-        return DECAY_QUANTITIES if self.kind == "decay" else CAMPAIGN_QUANTITIES
+        return DECAY_QUANTITIES if self.kind == "decay" else PARAMETERS
 
     @property
     def runs(self) -> int:
@@ -267,9 +267,13 @@ def packaged_grid() -> Grid:
 
 @dataclass(frozen=True, eq=False)
 class ScoreTrial:
-    """A campaign without stated noise, with truth and Cramér–Rao bound by quantity, SI.
+    """A campaign of known truth.
 
-    The bound is for the nominal model, including any scatter between the runs.
+    Args:
+        truth: true values by quantity, SI; ζ and ωn for the first run. With a lag of the air, Cnβ and Cnr are in
+            phase with angle and rate.
+        bound: Cramér–Rao bound of the nominal model by quantity, SI, including any scatter between the runs;
+            quantities without one are left out.
     """
 
     campaign: Campaign
@@ -278,7 +282,9 @@ class ScoreTrial:
 
 
 def draw_trial(cell: Cell, seed: int, number: int) -> ScoreTrial:
-    """Make one trial of a cell; trials are numbered from 0. Results are bit-identical for equal arguments.
+    """Make one trial of a cell, without stated noise; trials are numbered from 0.
+
+    Results are bit-identical for equal arguments.
 
     Raises:
         TunnelError: when a run leaves the finite range.

@@ -5,16 +5,15 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from identification.estimators import free_decay_estimators
-from tunnel_lab.experiments.experiment import RESULTS, Experiment, Parts, read_manifest
-from tunnel_lab.experiments.sweep_cases import SweepCases
+from tunnel_lab.experiments.experiment import RESULTS, Experiment, read_manifest
+from tunnel_lab.experiments.sweep_cases import Sweep
 from tunnel_lab.experiments.sweep_tables import (
     SweepDocument,
     axis_lengths,
@@ -24,68 +23,32 @@ from tunnel_lab.experiments.sweep_work import RECORDS, run_shard
 from tunnel_lab.terminal.arguments import NO_EFFECT
 from tunnel_sim.effects import effect_class
 from tunnel_sim.files.plan_file import check_conditions, first_twice
-from tunnel_sim.files.reading import as_described, parse_json
 from tunnel_sim.files.rig_file import parse_rig, rig_document
 from tunnel_sim.files.toml_input import load_toml, validate
 from tunnel_sim.physics.run_settings import sampling
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, shown
 
 
-@dataclass(frozen=True)
-class Sweep(SweepCases):
-    """A sweep file, as text for any worker and as an experiment."""
-
-    @property
-    def experiment(self) -> Experiment[int]:
-        """The sweep as an experiment: a task is a shard, some consecutive cases that are simulated together."""
-        last, numbers = (
-            len(str(self.shards - 1)),
-            {"cases": self.size, "runs": self.runs, "shards": self.shards},
-        )
-        return Experiment(
-            "sweep",
-            range(self.shards),
-            partial(run_shard, self),
-            lambda shard: f"part-{shard:0{max(5, last)}d}",
-            json.loads(self.to_json()),
-            estimators=self.document.estimators,
-            datasets=(RESULTS, RECORDS) if self.document.records else (RESULTS,),
-            weight=lambda shard: min(self.cases_per_shard, self.size - shard * self.cases_per_shard),
-            about={"name": self.document.name, **numbers},
-            described=_described,
-        )
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """A worker process rebuilds the sweep once from its text, and its axes once."""
-        return _received, (self.to_json(),)
-
-    def to_json(self) -> str:
-        """The sweep as one line of JSON, from which any worker can rebuild it."""
-        return json.dumps(
-            {"document": self.document.model_dump(), "rigs": list(self.rigs)}, sort_keys=True, allow_nan=False
-        )
-
-    @classmethod
-    def from_json(cls, text: str) -> Sweep:
-        """The inverse of `to_json`; a `TunnelError` when the text is not a sweep, or is too large."""
-        where, remedy = "the sweep as JSON", "start the sweep again"
-        document = parse_json(text, where, remedy)
-        with as_described("is not a sweep", where, remedy):
-            sweep = cls(SweepDocument.model_validate(document["document"]), tuple(document["rigs"]))
-            check_sweep_size(sweep.document, where)
-            if len(sweep._parsed) != len(sweep.document.rig):
-                raise ValueError("rigs")
-        return sweep
+def sweep_of(sweep: Sweep) -> Experiment[int]:
+    """Simulate and estimate the cases of a sweep: a task is a shard, consecutive cases simulated together."""
+    last, each = len(str(sweep.shards - 1)), sweep.cases_per_shard
+    return Experiment(
+        "sweep",
+        range(sweep.shards),
+        partial(run_shard, sweep),
+        lambda shard: f"part-{shard:0{max(5, last)}d}",
+        json.loads(sweep.to_json()),
+        estimators=sweep.document.estimators,
+        datasets=(RESULTS, RECORDS) if sweep.document.records else (RESULTS,),
+        weight=lambda shard: min(each, sweep.size - shard * each),
+        about={"name": sweep.document.name, "cases": sweep.size, "runs": sweep.runs, "shards": sweep.shards},
+        described=_described,
+    )
 
 
-@lru_cache(maxsize=2)
-def _received(text: str) -> Sweep:
-    return Sweep.from_json(text)
-
-
-def _described(kept: Any) -> Mapping[str, Any]:
+def _described(manifest: Any) -> Mapping[str, Any]:
     """The description in a manifest, with the keys of this version."""
-    return dict(json.loads(Sweep.from_json(json.dumps(kept)).to_json()))
+    return dict(json.loads(Sweep.from_json(json.dumps(manifest)).to_json()))
 
 
 def read_sweep(path: Path, estimators: Sequence[str] = ()) -> Sweep:
@@ -200,8 +163,3 @@ def stored_sweep(folder: Path) -> Sweep:
         TunnelError: when it does not hold a sweep, or the sweep is malformed or of another format version.
     """
     return Sweep.from_json(json.dumps(read_manifest("sweep", folder)["sweep"]))
-
-
-def open_store(folder: Path) -> Parts[int]:
-    """The results in the folder of a sweep; errors as in `stored_sweep`."""
-    return Parts(folder, stored_sweep(folder).experiment)

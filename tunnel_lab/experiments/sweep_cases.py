@@ -9,16 +9,17 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import product
 from math import prod
 from typing import Any
 
 import numpy as np
 
-from tunnel_lab.experiments.sweep_tables import SweepDocument, axis_lengths, cases_per_shard
+from tunnel_lab.experiments.sweep_tables import SweepDocument, axis_lengths, cases_per_shard, check_sweep_size
 from tunnel_lab.terminal.arguments import NO_EFFECT
 from tunnel_sim.files.plan_file import PlanDocument, plan_from, run_count
+from tunnel_sim.files.reading import as_described, parse_json
 from tunnel_sim.files.rig_file import parse_rig
 from tunnel_sim.vocabulary.plan import CampaignPlan
 from tunnel_sim.vocabulary.rig import Rig
@@ -47,7 +48,7 @@ class SweepCase:
 
 
 @dataclass(frozen=True)
-class SweepCases:
+class Sweep:
     """A sweep file with the sections of each rig's description, which together determine the results."""
 
     document: SweepDocument
@@ -137,10 +138,37 @@ class SweepCases:
             conditions["duration"], plan, document,
         )  # fmt: skip
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A worker process rebuilds the sweep once from its text, and its axes once."""
+        return _received, (self.to_json(),)
+
+    def to_json(self) -> str:
+        """The sweep as one line of JSON, from which any worker can rebuild it."""
+        return json.dumps(
+            {"document": self.document.model_dump(), "rigs": list(self.rigs)}, sort_keys=True, allow_nan=False
+        )
+
+    @classmethod
+    def from_json(cls, text: str) -> Sweep:
+        """The inverse of `to_json`; a `TunnelError` when the text is not a sweep, or is too large."""
+        where, remedy = "the sweep as JSON", "start the sweep again"
+        document = parse_json(text, where, remedy)
+        with as_described("is not a sweep", where, remedy):
+            sweep = cls(SweepDocument.model_validate(document["document"]), tuple(document["rigs"]))
+            check_sweep_size(sweep.document, where)
+            if len(sweep._parsed) != len(sweep.document.rig):
+                raise ValueError("rigs")
+        return sweep
+
     @cached_property
     def _parsed(self) -> tuple[Rig, ...]:
         named = zip(self.document.rig, self.rigs, strict=True)
         return tuple(parse_rig(sections, f"rig '{table.name}'") for table, sections in named)
+
+
+@lru_cache(maxsize=2)
+def _received(text: str) -> Sweep:
+    return Sweep.from_json(text)
 
 
 def _spread(table: Mapping[str, Sequence[float]]) -> list[dict[str, float]]:

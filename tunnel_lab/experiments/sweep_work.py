@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from identification.estimate import PARAMETERS, UNITS
+from identification.estimate import PARAMETERS
 from identification.estimators import make_estimator
 from tunnel_lab.experiments.bounds import PlanBounds, nominal_oscillation, plan_bounds, recovered
 from tunnel_lab.experiments.estimate_rows import (
@@ -22,7 +22,7 @@ from tunnel_lab.experiments.estimate_rows import (
     quantity_rows,
 )
 from tunnel_lab.experiments.experiment import RESULTS, Done, parquet
-from tunnel_lab.experiments.sweep_cases import SweepCase, SweepCases
+from tunnel_lab.experiments.sweep_cases import Sweep, SweepCase
 from tunnel_lab.terminal.arguments import NO_EFFECT
 from tunnel_sim.effects import BetweenRuns, effect_class, effect_from
 from tunnel_sim.vocabulary.between_runs import SCATTERED, Scatter
@@ -36,8 +36,8 @@ if TYPE_CHECKING:
 
 RECORDS = "records"
 NOT_SIMULATED, SIMULATED = "not_simulated", "simulated"
-RUN_QUANTITIES: Mapping[str, str] = {"omega_n": "rad/s", "zeta": "1"}
-CAMPAIGN_QUANTITIES: Mapping[str, str] = {**{name: UNITS[name] for name in PARAMETERS}, "sensor_zero": "rad"}
+RUN_QUANTITIES = ("omega_n", "zeta")
+CAMPAIGN_QUANTITIES = (*PARAMETERS, "sensor_zero")
 SCATTER_COLUMNS: Mapping[str, str] = {f"scatter_{one.name}": one.name for one in fields(Scatter)}
 """The column for each number of a scatter."""
 CASE_COLUMNS: Mapping[str, Any] = {
@@ -48,7 +48,7 @@ CASE_COLUMNS: Mapping[str, Any] = {
     "effect": pl.String,
     "severity": pl.Float64,
     "effect_parameters": pl.String,
-    **dict.fromkeys(("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping", "sensor_zero"), pl.Float64),
+    **dict.fromkeys(CAMPAIGN_QUANTITIES, pl.Float64),
     **dict.fromkeys(SCATTER_COLUMNS, pl.Float64),
 }
 """The simulated case; coefficients, zero and scatter are the injected ones."""
@@ -70,7 +70,7 @@ RECORD_COLUMNS: Mapping[str, Any] = {
 _estimator = lru_cache(maxsize=16)(make_estimator)
 
 
-def run_shard(sweep: SweepCases, index: int, nthread: int = 1) -> Done:
+def run_shard(sweep: Sweep, index: int, nthread: int = 1) -> Done:
     """Simulate the cases of a shard together, and estimate them one by one.
 
     Args:

@@ -52,6 +52,8 @@ FAR = 3e4
 _EFFECTS_WEIGHT = 0.1  # weight of the effects' cross entropy, relative to the posterior's
 _LEAST_STD = 0.05  # minimum standard deviation of an input over the training set
 _GREATEST_GRADIENT = 5.0
+_BATCH = 64
+_RATE = 1.5e-3  # greatest learning rate; a cosine schedule reduces it to zero
 
 
 @dataclass(frozen=True)
@@ -148,10 +150,9 @@ def _fitted(
                 state = State(weights, moments, step)
         except (SafetensorError, ValueError, LookupError, TypeError):
             state = None
-    fitting = FitSpec(spec.seed, spec.steps)
-    state = state or start_state(samples, fitting)
+    state = state or start_state(samples, spec)
     while state.step < spec.steps:
-        state = fit(samples, fitting, state, until=state.step + _KEPT_EVERY)
+        state = fit(samples, spec, state, until=state.step + _KEPT_EVERY)
         tensors = {f"w/{n}": v for n, v in state.weights.items()}
         tensors |= {f"m/{n}": v for n, v in state.moments.items()}
         write_whole(path, save(tensors, {"mark": mark, "step": str(state.step)}))
@@ -179,21 +180,6 @@ def judged(
     return replace(trained, threshold=float(np.quantile(distances, 1.0 - FALSE_ALARMS)))
 
 
-@dataclass(frozen=True)
-class FitSpec:
-    """Settings of a network's fit.
-
-    Args:
-        steps: number of batches.
-        rate: greatest learning rate, dimensionless; a cosine schedule reduces it to zero.
-    """
-
-    seed: int = 1
-    steps: int = 4000
-    batch: int = 64
-    rate: float = 1.5e-3
-
-
 @dataclass(frozen=True, eq=False)
 class State:
     """State of a fit: weights, Adam's moments of the gradients, number of steps done."""
@@ -211,7 +197,7 @@ def usable(samples: Mapping[str, Array]) -> dict[str, Array]:
     return {name: values[near] for name, values in samples.items()}
 
 
-def start_state(samples: Mapping[str, Array], spec: FitSpec) -> State:
+def start_state(samples: Mapping[str, Array], spec: ShardedTraining) -> State:
     """Initial weights, and scalings from the training samples."""
     rivals, runs = samples["rivals"], samples["runs"]
     sizes = weight_shapes(
@@ -235,12 +221,11 @@ def start_state(samples: Mapping[str, Array], spec: FitSpec) -> State:
 
 def fit(
     samples: Mapping[str, Array],
-    spec: FitSpec,
+    spec: ShardedTraining,
     state: State,
-    progress: Callable[[int, float], None] = lambda _step, _loss: None,
     until: int | None = None,
 ) -> State:
-    """Continue a fit until a step (None: the last); progress is called with the step and its loss."""
+    """Continue a fit until a step; None: the last."""
     import torch
 
     torch.set_num_threads(1)
@@ -257,7 +242,7 @@ def fit(
     count = len(data["target"])
     for step in range(state.step, min(until or spec.steps, spec.steps)):
         rng = np.random.default_rng([spec.seed, 1, step])
-        rows = torch.from_numpy(rng.integers(0, count, spec.batch))
+        rows = torch.from_numpy(rng.integers(0, count, _BATCH))
         batch = {name: values[rows] for name, values in data.items()}
         posterior, effects = losses(torch, weights, batch)
         value = posterior + _EFFECTS_WEIGHT * effects
@@ -265,7 +250,7 @@ def fit(
         norm = math.sqrt(sum(float((g * g).sum()) for g in gradients))
         shrink = min(1.0, _GREATEST_GRADIENT / max(norm, 1e-12))
         warm = min(1.0, (step + 1) / 100.0)
-        rate = spec.rate * warm * 0.5 * (1.0 + math.cos(math.pi * step / spec.steps))
+        rate = _RATE * warm * 0.5 * (1.0 + math.cos(math.pi * step / spec.steps))
         with torch.no_grad():
             for name, gradient in zip(trained, gradients, strict=True):
                 first[name].lerp_(shrink * gradient, 0.1)
@@ -273,7 +258,6 @@ def fit(
                 move = first[name] / (1.0 - 0.9 ** (step + 1))
                 size = (second[name] / (1.0 - 0.999 ** (step + 1))).sqrt() + 1e-8
                 weights[name] -= rate * (move / size + 1e-3 * weights[name])
-        progress(step, float(value.detach()))
     moments = {f"1.{n}": v.numpy() for n, v in first.items()} | {
         f"2.{n}": v.numpy() for n, v in second.items()
     }

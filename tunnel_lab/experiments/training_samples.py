@@ -13,6 +13,7 @@ import numpy as np
 import polars as pl
 
 from identification.campaign.derivatives import build_design
+from identification.estimate import PARAMETERS
 from identification.neural.demodulated import Demodulated, demodulate
 from identification.neural.rivals import Features, campaign_features, record_features
 from tunnel_lab.experiments.experiment import Done, Experiment, parquet
@@ -149,7 +150,7 @@ def readings_of(spec: ShardSpec) -> Iterator[tuple[Campaign, TrueConditions, lis
 
 def truth_of(c: TrueConditions) -> dict[str, float]:
     """The campaign's true coefficients by name, SI."""
-    return {name: getattr(c, name) for name in ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")}
+    return {name: getattr(c, name) for name in PARAMETERS}
 
 
 def reduced(

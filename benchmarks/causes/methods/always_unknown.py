@@ -13,11 +13,7 @@ ABOUT = About(
 
 
 def answer(folder: Path) -> dict[str, Any]:  # noqa: ARG001 — the signature of all methods
-    """The same answer to every campaign.
-
-    Args:
-        folder: folder of the campaign; it is not read.
-    """
+    """The same answer to every campaign."""
     return answer_of([UNKNOWN], {**dict.fromkeys(NAMES, 0.05), UNKNOWN: 0.5})
 
 

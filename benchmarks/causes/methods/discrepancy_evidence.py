@@ -30,11 +30,7 @@ Names = tuple[str, ...]
 
 
 def answer(folder: Path) -> dict[str, Any]:
-    """Answer one campaign.
-
-    Args:
-        folder: folder of the campaign.
-    """
+    """Answer one campaign."""
     from benchmarks.causes.fits import grown
 
     found = grown(folder)
@@ -83,7 +79,7 @@ def weigh(
     unknown = [float(logsumexp(nominal.log + hyper))]
     for names, found in sets.items():
         log = found.log + hyper + np.log(ODDS) * (len(names) - 1)
-        small = found.left <= LEFT
+        small = found.error_share <= LEFT
         known[names] = float(logsumexp(log, b=small)) if small.any() else -np.inf
         unknown.append(float(logsumexp(log, b=~small)) if not small.all() else -np.inf)
     for names, (beside, drop) in random.items():

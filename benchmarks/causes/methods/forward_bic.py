@@ -20,11 +20,7 @@ ABOUT = About(
 
 
 def answer(folder: Path) -> dict[str, Any]:
-    """Answer one campaign.
-
-    Args:
-        folder: folder of the campaign.
-    """
+    """Answer one campaign."""
     from benchmarks.causes.fits import candidates, nominal
 
     start, read_off, detected = nominal(folder)

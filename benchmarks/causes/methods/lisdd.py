@@ -35,11 +35,7 @@ ABOUT = About(
 
 
 def answer(folder: Path) -> dict[str, Any]:
-    """Answer one campaign.
-
-    Args:
-        folder: folder of the campaign.
-    """
+    """Answer one campaign."""
     where = equations(folder)
     data = Regression.of(where)
     if data.gap < DETECTED:
@@ -60,7 +56,6 @@ def localised(where: Equations, data: Regression) -> list[str]:
 
     Args:
         where: amplitude and phase of the rows.
-        data: the regression.
     """
     regime = np.digitize(where.level, (0.25, 0.5)) * 4 + (where.phase // (0.5 * np.pi)).astype(int) % 4
     flagged = np.zeros(regime.size, bool)
@@ -74,8 +69,6 @@ def exhaustive(data: Regression, names: Sequence[str], third: NDArray[np.int64])
     """The set that best predicts the second third after a fit to the first; larger sets need a sufficient gain.
 
     Args:
-        data: the regression.
-        names: names of the candidates.
         third: number of each row's third, shape (rows,).
     """
     fit, held = third == 0, third == 1
@@ -108,9 +101,6 @@ def f_test(data: Regression, chosen: Sequence[str], name: str, rows: Array) -> f
     """p-value of a term beside the others, on rows not used for its selection or fit.
 
     Args:
-        data: the regression.
-        chosen: names of the terms.
-        name: of the tested term.
         rows: mask of the rows, shape (rows,).
     """
     others = [n for n in chosen if n != name]
@@ -126,11 +116,7 @@ def f_test(data: Regression, chosen: Sequence[str], name: str, rows: Array) -> f
 
 
 def benjamini_hochberg(p: dict[str, float]) -> list[str]:
-    """Terms with a false-discovery rate below the level.
-
-    Args:
-        p: p-values by name.
-    """
+    """Terms with a false-discovery rate below the level."""
     ranked = sorted(p, key=p.__getitem__)
     passed = [i for i, name in enumerate(ranked, 1) if p[name] <= LEVEL * i / len(ranked)]
     return ranked[: max(passed, default=0)]

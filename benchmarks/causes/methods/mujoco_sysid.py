@@ -28,18 +28,14 @@ ABOUT = About(
 
 
 def answer(folder: Path) -> dict[str, Any]:
-    """Answer one campaign.
-
-    Args:
-        folder: folder of the campaign.
-    """
+    """Answer one campaign."""
     rig = ToolboxRig(folder)
     start = rig.fit((), NOMINAL, np.zeros(len(NOMINAL) + 2 * len(rig.trials)))
-    before, gap = coefficients(rig, start), start.chi2 / start.left.size
+    before, gap = coefficients(rig, start), start.chi2 / start.residuals.size
     if gap < DETECTED:
         return answer_of([], dict.fromkeys(NAMES, 0.01), (), {"before": before, "after": before})
     best, fitted = start, [start]
-    while len(best.causes) < MOST and best.chi2 / best.left.size > DETECTED:
+    while len(best.causes) < MOST and best.chi2 / best.residuals.size > DETECTED:
         found = [rig.fit(*one) for one in ranked(rig, best)[:FITTED]]
         fitted += found
         following = min(found, key=score, default=best)
@@ -48,21 +44,20 @@ def answer(folder: Path) -> dict[str, Any]:
         best = following
     stated = {"before": before, "after": coefficients(rig, best)}
     sets, inclusion = weighed([(f.causes, score(f)) for f in fitted])
-    if gap - best.chi2 / best.left.size < CLOSED * (gap - 1.0):
+    if gap - best.chi2 / best.residuals.size < CLOSED * (gap - 1.0):
         return answer_of([UNKNOWN], {**{n: 0.3 * p for n, p in inclusion.items()}, UNKNOWN: 0.7}, (), stated)
     return answer_of(best.causes, inclusion, sets, stated)
 
 
 def score(fit: ToolboxFit) -> float:
     """Bayesian information criterion of a fit."""
-    return bic(fit.chi2, len(fit.names) - len(NOMINAL), fit.left.size)
+    return bic(fit.chi2, len(fit.names) - len(NOMINAL), fit.residuals.size)
 
 
 def ranked(rig: ToolboxRig, best: ToolboxFit) -> list[tuple[tuple[str, ...], tuple[str, ...], Array]]:
     """Fits to make, in increasing order of the BIC that the linear model predicts.
 
     Args:
-        rig: the campaign.
         best: fit to which a cause is added.
     """
     found = []
@@ -71,15 +66,15 @@ def ranked(rig: ToolboxRig, best: ToolboxFit) -> list[tuple[tuple[str, ...], tup
         names, which = (*best.names, *own), range(size, size + len(own))
         x = np.concatenate((best.x[:size], np.zeros(len(own)), best.x[size:]))
         params = rig.params(names, x)
-        left = best.left
+        left = best.residuals
         if cause == "coulomb_friction":  # with finer steps
             left = np.concatenate([r for one in rig.runs(params) for r in one(x, params)[0]])
         new = rig.jacobian(params, x, left, which, 0.01, 0)[:, which]
         columns = np.column_stack((best.jacobian, new))
-        step = np.linalg.lstsq(columns, -best.left, rcond=1e-10)[0]
+        step = np.linalg.lstsq(columns, -best.residuals, rcond=1e-10)[0]
         if BOUNDS.get(cause, (-1.0,))[0] == 0.0 and step[-1] <= 0.0:
             continue  # only the opposite sign, which is excluded, would improve the fit
-        rest = best.left + columns @ step
+        rest = best.residuals + columns @ step
         x[which] = np.clip(step[best.x.size :], -10.0, 10.0)
         expected = bic(float(rest @ rest), len(names) - len(NOMINAL), rest.size)
         found.append((expected, ((*best.causes, cause), names, x)))
@@ -87,17 +82,12 @@ def ranked(rig: ToolboxRig, best: ToolboxFit) -> list[tuple[tuple[str, ...], tup
 
 
 def coefficients(rig: ToolboxRig, fit: ToolboxFit) -> dict[str, dict[str, float]]:
-    """Cnβ and Cnr with the toolbox's standard deviations, 1/rad, where the wind was on.
-
-    Args:
-        rig: the campaign.
-        fit: fit of the campaign.
-    """
+    """Cnβ and Cnr with the toolbox's standard deviations, 1/rad, where the wind was on."""
     from mujoco import sysid
 
     if not rig.stated:
         return {}
-    std = np.sqrt(np.diag(sysid.calculate_intervals([fit.left], fit.jacobian)[0]))
+    std = np.sqrt(np.diag(sysid.calculate_intervals([fit.residuals], fit.jacobian)[0]))
     at = {name: (fit.names.index(name), 0.01 * rig.unit[name]) for name in rig.cn}
     return {
         name: {"value": rig.cn[name] + unit * float(fit.x[i]), "std": unit * float(std[i])}

@@ -35,11 +35,7 @@ ABOUT = About(
 
 
 def answer(folder: Path) -> dict[str, Any]:
-    """Answer one campaign.
-
-    Args:
-        folder: folder of the campaign.
-    """
+    """Answer one campaign."""
     measured, weight, nominal, templates = backbones(read_campaign(folder))
     basis = np.linalg.qr(nominal * weight[:, None])[0]
 
@@ -65,9 +61,6 @@ def answer(folder: Path) -> dict[str, Any]:
 
 def backbones(campaign: Campaign) -> tuple[Array, Array, Array, dict[str, Array]]:
     """Stiffness and damping per inertia against amplitude, and the influences of nominal model and causes on them.
-
-    Args:
-        campaign: the runs.
 
     Returns:
         Measured values, ω² (1/s²) and 2σω (1/s²) of every window, shape (2 windows,); one over their standard

@@ -23,11 +23,7 @@ ABOUT = About(
 
 
 def answer(folder: Path) -> dict[str, Any]:
-    """Answer one campaign.
-
-    Args:
-        folder: folder of the campaign.
-    """
+    """Answer one campaign."""
     from benchmarks.causes.summaries import summaries
     from tunnel_sim.files.campaign_folder import read_campaign
 

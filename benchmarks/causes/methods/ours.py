@@ -14,11 +14,7 @@ ABOUT = About("tunnel diagnose", "as delivered, no option")
 
 
 def answer(folder: Path) -> dict[str, Any]:
-    """Diagnose one campaign.
-
-    Args:
-        folder: folder of the campaign.
-    """
+    """Diagnose one campaign."""
     from diagnosis import diagnose
 
     found = diagnose(folder, kinds=KINDS)

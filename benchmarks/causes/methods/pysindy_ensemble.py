@@ -23,11 +23,7 @@ ABOUT = About(
 
 
 def answer(folder: Path) -> dict[str, Any]:
-    """Answer one campaign.
-
-    Args:
-        folder: folder of the campaign.
-    """
+    """Answer one campaign."""
     data = Regression.of(equations(folder))
     names = list(data.causes)
     if not names or data.gap < DETECTED:
@@ -40,11 +36,7 @@ def answer(folder: Path) -> dict[str, Any]:
 
 
 def inclusion_of(data: Regression) -> dict[str, float]:
-    """Share of the ensemble's models that keep a column of each cause.
-
-    Args:
-        data: the regression.
-    """
+    """Share of the ensemble's models that keep a column of each cause."""
     import pysindy
 
     names = list(data.causes)

@@ -27,11 +27,7 @@ ABOUT = About(
 
 
 def answer(folder: Path) -> dict[str, Any]:
-    """Answer one campaign.
-
-    Args:
-        folder: folder of the campaign.
-    """
+    """Answer one campaign."""
     data = Regression.of(equations(folder))
     names = list(data.causes)
     sets = sample(data, np.random.default_rng(0))
@@ -46,12 +42,7 @@ def answer(folder: Path) -> dict[str, Any]:
 
 
 def sample(data: Regression, rng: np.random.Generator) -> Counter[tuple[str, ...]]:
-    """Number of visits of Gibbs sampling to each set of causes.
-
-    Args:
-        data: the regression.
-        rng: source of all random numbers.
-    """
+    """Number of visits of Gibbs sampling to each set of causes."""
     names = list(data.causes)
     columns = np.column_stack([data.causes[n] for n in names]) if names else np.zeros((data.target.size, 0))
     owner = np.repeat(np.arange(len(names)), [data.causes[n].shape[1] for n in names])
@@ -83,7 +74,6 @@ def log_marginal(gram: Array, load: Array, power: float, size: int, which: Array
         gram: products of the columns, shape (k, k).
         load: products with the target, shape (k,).
         power: sum of squares of the target, in noise variances.
-        size: number of rows.
         which: included columns, shape (k,).
     """
     if not np.any(which):

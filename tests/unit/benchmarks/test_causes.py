@@ -457,6 +457,6 @@ def test_the_toolbox_fits_the_nominal_model_within_the_noise(small):
     name = next(n for n, t in truths.items() if t["track"] == "none")
     found = ToolboxRig(small / CAMPAIGNS / name)
     fit = found.fit((), NOMINAL, np.zeros(len(NOMINAL) + 2 * len(found.trials)))
-    assert fit.chi2 / fit.left.size < 1.15
+    assert fit.chi2 / fit.residuals.size < 1.15
     for which, given in coefficients(found, fit).items():
         assert abs(given["value"] - truths[name][which]) < 4.0 * given["std"]

@@ -50,7 +50,7 @@ def test_the_evidence_is_that_of_the_dense_normal_law():
         covariance = np.eye(rows) + slopes @ prior @ slopes.T + eta**2 * basis @ basis.T
         truth = multivariate_normal(np.zeros(rows), covariance).logpdf(residual[:, 0])
         assert log == pytest.approx(truth + 0.5 * rows * np.log(2.0 * np.pi), abs=1e-6)
-    assert found.left[0] < 1e-4
+    assert found.error_share[0] < 1e-4
 
 
 def test_weights_are_evidences_times_prior_odds_and_large_errors_are_unknown():

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 from diagnosis.answer.run_deviations import Spread
 from diagnosis.findings.decision import Decision
@@ -26,31 +26,42 @@ MODERATE = (1.0, 10.0)
 """Excess of a moderate gap: 1 to 10 noise variances."""
 
 
-class _Read(BaseModel):
-    """The scored part of a truth; the rest is ignored."""
+class ScaleTable(BaseModel):
+    """The scale of a rig."""
 
     model_config = ConfigDict(strict=True, allow_inf_nan=False)
 
-
-class _Scale(_Read):
-    time: float = 1.0
+    time: float = Field(default=1.0, description="time over the standard rig's, a ratio")
 
 
-class _Truth(_Read):
-    effects: list[str]
-    scatter: dict[str, NotNegative] = {}
-    scatter_level: str = ""
-    scatter_form: str = "normal"
-    repeatability: dict[str, NotNegative] = {}
-    small: list[str] = []
-    scale: _Scale = _Scale()
-    few_runs: bool = False
-    coloured_share: float = 0.0
-    stamps: str = "even"
-    severity: float | None = None
-    cn_beta: float = 1.0
-    cn_r: float = 1.0
-    in_phase: dict[str, float] = {}
+class CampaignTruth(BaseModel):
+    """The scored part of a truth, as the key states it; the rest is ignored."""
+
+    model_config = ConfigDict(strict=True, allow_inf_nan=False)
+
+    effects: list[str] = Field(description="effects that act and are to be found")
+    small: list[str] = Field(default=[], description="effects that act but need not be found")
+    severity: float | None = Field(
+        default=None, description="excess of the nominal model as a ratio to the noise variance"
+    )
+    cn_beta: float | None = Field(default=None, description="Cnβ, 1/rad")
+    cn_r: float | None = Field(default=None, description="Cnr, 1/rad")
+    in_phase: dict[str, float] = Field(
+        default={},
+        description="with a lag of the air, Cnβ and Cnr in phase with angle and rate (decision 0004)",
+    )
+    scatter: dict[str, NotNegative] = Field(
+        default={}, description="relative standard deviations between the runs, by quantity"
+    )
+    scatter_level: str = Field(default="", description="level of these widths, such as small")
+    scatter_form: str = Field(default="normal", description="form of their distribution")
+    repeatability: dict[str, NotNegative] = Field(
+        default={}, description="widths that the campaign states, relative, by quantity"
+    )
+    scale: ScaleTable = ScaleTable()
+    few_runs: bool = Field(default=False, description="whether there are few springs and speeds")
+    coloured_share: float = Field(default=0.0, description="share of coloured noise in the sensor's variance")
+    stamps: str = Field(default="even", description="even, rounded or jittered")
 
 
 @dataclass(frozen=True)
@@ -99,23 +110,6 @@ class ScoredAnswer:
 
 
 @dataclass(frozen=True)
-class TrueScatter:
-    """Differences between the runs of a campaign.
-
-    Args:
-        widths: standard deviation between runs by quantity, relative; empty where the runs repeat.
-        level: level of the widths, such as ``small``; empty if the truth does not state it.
-        form: form of the distribution.
-        stated: scatter stated by the campaign, relative, by quantity; empty for nothing.
-    """
-
-    widths: Mapping[str, float] = field(default_factory=dict)
-    level: str = ""
-    form: str = "normal"
-    stated: Mapping[str, float] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
 class CoefficientError:
     """An estimate minus the truth.
 
@@ -135,33 +129,39 @@ class Case:
     """One campaign.
 
     Args:
-        truth: true effects, sorted; ``("unknown",)`` outside the vocabulary, empty for none.
-        withheld: whether one of these effects was excluded from the vocabulary, so that the truth is unknown.
-        severity: excess of the nominal model as a ratio to the noise variance; None where the truth does not state
-            it.
-        coefficients: true ``cn_beta`` and ``cn_r``, 1/rad. If a lag of the air acts that the answer does not
-            name, they are in phase with angle and rate (decision 0004).
+        stated: truth from the key.
+        withheld: whether one of its effects was excluded from the vocabulary, so that the truth is unknown.
         answer: the scored part of the diagnosis.
-        small: effects that act but need not be found, sorted.
-        time_scale: time over the standard rig's, a ratio.
-        few_runs: whether the protocol has few springs and speeds.
-        coloured: whether the sensor's noise is coloured.
-        stamps: ``even``, ``rounded`` or ``jittered``.
-        scatter: differences between the runs, beside the causes.
     """
 
     name: str
-    truth: tuple[str, ...]
+    stated: CampaignTruth
     withheld: bool
-    severity: float | None
-    coefficients: Mapping[str, float]
     answer: ScoredAnswer
-    small: tuple[str, ...] = ()
-    time_scale: float = 1.0
-    few_runs: bool = False
-    coloured: bool = False
-    stamps: str = "even"
-    scatter: TrueScatter = field(default_factory=TrueScatter)
+
+    @property
+    def truth(self) -> tuple[str, ...]:
+        """True effects, sorted; ``("unknown",)`` outside the vocabulary, empty for none."""
+        return UNKNOWN if self.withheld else tuple(sorted(self.stated.effects))
+
+    @property
+    def small(self) -> tuple[str, ...]:
+        """Effects that act but need not be found, sorted."""
+        return tuple(sorted(self.stated.small))
+
+    @property
+    def widths(self) -> dict[str, float]:
+        """True standard deviations between the runs by quantity, relative; empty where the runs repeat."""
+        return {
+            name: width for name, width in self.stated.scatter.items() if width > 0.0 and name in SCATTERED
+        }
+
+    @property
+    def coefficients(self) -> dict[str, float]:
+        """True ``cn_beta`` and ``cn_r``, 1/rad; in phase with a lag of the air that the answer does not name."""
+        lagging = {kind.name for kind in known_effects() if issubclass(kind, OutOfPhase)}
+        drawn = {name: value for name in NAMES if (value := getattr(self.stated, name)) is not None}
+        return drawn if lagging & {*(self.answer.causes or ())} else drawn | self.stated.in_phase
 
     @property
     def causes(self) -> tuple[str, ...] | None:
@@ -209,11 +209,11 @@ class Case:
     @property
     def severity_class(self) -> str:
         """``below 1``, ``1 to 10``, ``above 10`` or, where unknown, empty."""
-        if self.severity is None:
+        if self.stated.severity is None:
             return ""
-        if self.severity < MODERATE[0]:
+        if self.stated.severity < MODERATE[0]:
             return "below 1"
-        return "1 to 10" if self.severity <= MODERATE[1] else "above 10"
+        return "1 to 10" if self.stated.severity <= MODERATE[1] else "above 10"
 
     @property
     def named_rightly(self) -> bool:
@@ -226,20 +226,15 @@ class Case:
         return self.answer.probabilities.get(" + ".join(self.answer.causes or ()) or "none")
 
     @property
-    def decision(self) -> Decision | None:
-        """Whether the answer is decided, and the smallest set of likely answers; None if there is no answer."""
-        return self.answer.decision
-
-    @property
     def stated_wrongly(self) -> bool:
         """Whether the answer states a wrong set of effects; an undecided answer states none."""
-        found = self.decision
+        found = self.answer.decision
         return bool(self.named) and not self.right and (found is None or found.decided)
 
     @property
     def covered(self) -> bool | None:
         """Whether the true causes are in the smallest set of likely answers; None if there is no answer."""
-        found = self.decision
+        found = self.answer.decision
         if found is None:
             return None
         likely = [set(effect.split(" + ")) - {"none", *SCATTERS} for effect, _ in found.credible]
@@ -270,30 +265,8 @@ def case(name: str, truth: Mapping[str, Any], said: ScoredAnswer, excluded: Sequ
     Raises:
         ValueError: when the truth is malformed (pydantic's error, with the place).
     """
-    stated = _Truth.model_validate(truth)
-    effects = tuple(sorted(stated.effects))
-    withheld = bool(set(effects) & set(excluded))
-    lagging = {kind.name for kind in known_effects() if issubclass(kind, OutOfPhase)}
-    meant = truth if lagging & {*(said.causes or ())} else {**truth, **stated.in_phase}
-    return Case(
-        name=name,
-        truth=UNKNOWN if withheld else effects,
-        withheld=withheld,
-        severity=stated.severity,
-        coefficients={key: float(meant[key]) for key in NAMES if key in meant},
-        answer=said,
-        small=tuple(sorted(stated.small)),
-        time_scale=stated.scale.time,
-        few_runs=stated.few_runs,
-        coloured=stated.coloured_share > 0.0,
-        stamps=stated.stamps,
-        scatter=TrueScatter(
-            {name: width for name, width in stated.scatter.items() if width > 0.0 and name in SCATTERED},
-            stated.scatter_level,
-            stated.scatter_form,
-            stated.repeatability,
-        ),
-    )
+    stated = CampaignTruth.model_validate(truth)
+    return Case(name, stated, bool(set(stated.effects) & set(excluded)), said)
 
 
 def label(names: Sequence[str] | None) -> str:
@@ -314,24 +287,24 @@ GROUPS: dict[str, Callable[[Case], bool]] = {
     "two causes": lambda c: c.number == 2,
     "three causes": lambda c: c.number == 3,
     "four causes": lambda c: c.number == 4,
-    "none acts, coloured noise": lambda c: c.number == 0 and c.coloured,
-    "none acts, rounded or jittered stamps": lambda c: c.number == 0 and c.stamps != "even",
+    "none acts, coloured noise": lambda c: c.number == 0 and c.stated.coloured_share > 0.0,
+    "none acts, rounded or jittered stamps": lambda c: c.number == 0 and c.stated.stamps != "even",
     "outside the vocabulary": lambda c: c.truth == UNKNOWN,
     "small causes beside": lambda c: bool(c.small),
-    "coloured noise": lambda c: c.coloured,
-    "rounded stamps": lambda c: c.stamps == "rounded",
-    "jittered stamps": lambda c: c.stamps == "jittered",
-    "few runs": lambda c: c.few_runs,
-    "scatter between runs": lambda c: bool(c.scatter.widths),
-    "small scatter": lambda c: c.scatter.level == "small",
-    "large scatter": lambda c: c.scatter.level == "large",
-    "scatter, stated": lambda c: bool(c.scatter.stated),
-    "one cause beside scatter": lambda c: c.number == 1 and bool(c.scatter.widths),
-    "two causes beside scatter": lambda c: c.number == 2 and bool(c.scatter.widths),
-    "runs that repeat": lambda c: not c.scatter.widths,
-    "fast rigs": lambda c: c.time_scale < MIDDLE[0],
-    "middle rigs": lambda c: MIDDLE[0] <= c.time_scale <= MIDDLE[1],
-    "slow rigs": lambda c: c.time_scale > MIDDLE[1],
+    "coloured noise": lambda c: c.stated.coloured_share > 0.0,
+    "rounded stamps": lambda c: c.stated.stamps == "rounded",
+    "jittered stamps": lambda c: c.stated.stamps == "jittered",
+    "few runs": lambda c: c.stated.few_runs,
+    "scatter between runs": lambda c: bool(c.widths),
+    "small scatter": lambda c: c.stated.scatter_level == "small",
+    "large scatter": lambda c: c.stated.scatter_level == "large",
+    "scatter, stated": lambda c: bool(c.stated.repeatability),
+    "one cause beside scatter": lambda c: c.number == 1 and bool(c.widths),
+    "two causes beside scatter": lambda c: c.number == 2 and bool(c.widths),
+    "runs that repeat": lambda c: not c.widths,
+    "fast rigs": lambda c: c.stated.scale.time < MIDDLE[0],
+    "middle rigs": lambda c: MIDDLE[0] <= c.stated.scale.time <= MIDDLE[1],
+    "slow rigs": lambda c: c.stated.scale.time > MIDDLE[1],
     "all": lambda _: True,
 }
 
@@ -341,7 +314,6 @@ class CausesFound:
     """Success in finding the causes of some campaigns.
 
     Args:
-        group: group of campaigns.
         exact: campaigns with exactly right causes.
         found: proportion of the relevant true causes that are named.
         false: proportion of the named causes that do not act. Small causes that act do not count.
@@ -351,7 +323,6 @@ class CausesFound:
         credible_size: mean number of answers in these sets; 0 if there are none.
     """
 
-    group: str
     exact: Proportion
     found: Proportion
     false: Proportion
@@ -359,25 +330,18 @@ class CausesFound:
     covered: Proportion
     credible_size: float
 
-    def to_json_dict(self) -> dict[str, Any]:
-        """The shares by name, and ``credible_size``."""
-        shares = ("exact", "found", "false", "stated_wrongly", "covered")
-        found: dict[str, Any] = {name: getattr(self, name).to_json_dict() for name in shares}
-        return found | {"credible_size": self.credible_size}
 
-
-def found_by_group(cases: Sequence[Case]) -> list[CausesFound]:
+def found_by_group(cases: Sequence[Case]) -> dict[str, CausesFound]:
     """Causes found by group of campaigns, in the order of ``GROUPS``."""
-    result = []
+    result = {}
     for group, belongs in GROUPS.items():
         inside = [c for c in cases if belongs(c)]
         if inside:
             hits = [name in c.named for c in inside for name in c.truth if c.truth != UNKNOWN]
             wrong = [name not in c.truth for c in inside for name in c.named if name not in c.small]
             covered = [c.covered for c in inside if c.covered is not None]
-            sizes = [len(c.decision.credible) for c in inside if c.decision is not None]
-            found = CausesFound(
-                group,
+            sizes = [len(c.answer.decision.credible) for c in inside if c.answer.decision is not None]
+            result[group] = CausesFound(
                 exact=Proportion.of([c.right for c in inside]),
                 found=Proportion.of(hits),
                 false=Proportion.of(wrong),
@@ -385,7 +349,6 @@ def found_by_group(cases: Sequence[Case]) -> list[CausesFound]:
                 covered=Proportion.of(covered),
                 credible_size=sum(sizes) / len(sizes) if sizes else 0.0,
             )
-            result.append(found)
     return result
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from identification.printing import SYMBOLS
 from identification.show.blocks import Block, Figure, Heading, Paragraph, TextTable, as_markdown
 from identification.show.drawing import AFTER, BEFORE, INK, PAPER, QUIET
 from identification.show.numbers import plain
@@ -22,10 +23,10 @@ if TYPE_CHECKING:
 
     from identification.statistics import Proportion
     from tunnel_lab.experiments.blind import BlindScore
+    from tunnel_lab.experiments.blind.sets import MadeWith
 
 
 CALIBRATION = "Calibration"
-NAMES = {"cn_beta": "Cnβ", "cn_r": "Cnr"}
 KINDS = {
     "single": "one effect",
     "single, below 1": "· below 1 × noise variance",
@@ -74,7 +75,7 @@ def _answer_sections(score: BlindScore) -> list[ScoreSection]:
         "truth named as rival in a wrong answer": score.rivals(),
     }
     error, bins = score.calibration()
-    found, inclusion, smooth = score.found(), score.inclusion(), []
+    found, inclusion, smooth = score.causes_found(), score.inclusion(), []
     if inclusion is not None:
         ends = "{:.4f}–{:.4f}".format(*inclusion.interval)
         smooth = [(f"{inclusion.error:.4f}", ends, str(inclusion.statements), str(inclusion.campaigns))]
@@ -87,7 +88,7 @@ def _answer_sections(score: BlindScore) -> list[ScoreSection]:
         _section(
             "Causes found and false",
             ("group", "sets exact", "true causes found", "named causes false", ""),
-            ((one.group, _brief(one.exact), _brief(one.found), _brief(one.false), "") for one in found),
+            ((group, *map(_brief, (of.exact, of.found, of.false)), "") for group, of in found.items()),
             "Small causes that act beside others need not be named, and naming them is not an error. Fast and slow "
             "rigs have periods beyond a third and three times the standard rig's. Intervals take the causes of a "
             "campaign as independent.",
@@ -108,8 +109,8 @@ def _answer_sections(score: BlindScore) -> list[ScoreSection]:
             "Decisions",
             ("group", "wrong set stated", "true causes in the smallest set of 0.9", "its mean size"),
             (
-                (one.group, _brief(one.stated_wrongly), _brief(one.covered), f"{one.credible_size:.2f}")
-                for one in found
+                (group, _brief(of.stated_wrongly), _brief(of.covered), f"{of.credible_size:.2f}")
+                for group, of in found.items()
             ),
             "An answer below one half is undecided and states no set. The smallest set of answers that together "
             "have a probability of 0.9 should contain the true causes in about nine of ten campaigns.",
@@ -124,12 +125,6 @@ def _answer_sections(score: BlindScore) -> list[ScoreSection]:
     ]
 
 
-_SCATTER = {
-    "wind_speed": "wind speed",
-    "spring_stiffness": "spring stiffness",
-    "mechanical_damping": "mechanical damping",
-    "all": "all",
-}
 _OF_SCATTER = {
     "named_alone": "no cause, scatter not stated: scatter named and nothing else",
     "no_gap": "no cause, scatter as stated: nothing named",
@@ -163,13 +158,9 @@ def _scatter_sections(score: BlindScore) -> list[ScoreSection]:
                 "in the 90 % interval",
             ),
             (
-                (
-                    _SCATTER[one.number],
-                    *map(_brief, (one.named, one.false, one.within)),
-                    _brief(one.covered),
-                )
-                for one in scatter.by_number
-                if any(share.total for share in (one.named, one.false, one.within, one.covered))
+                (number.replace("_", " "), *map(_brief, (of.named, of.false, of.within, of.covered)))
+                for number, of in scatter.by_number.items()
+                if any(share.total for share in (of.named, of.false, of.within, of.covered))
             ),
         ),
     ]
@@ -193,11 +184,11 @@ def _other_sections(score: BlindScore) -> list[ScoreSection]:
         least, most = later.covered.interval
         coefficients.append(
             (
-                f"{group}: {NAMES[name]}",
-                f"{100.0 * earlier.median:.2g}",
-                f"{100.0 * later.median:.2g}",
-                f"{earlier.spread:.3g}",
-                f"{later.spread:.3g}",
+                f"{group}: {SYMBOLS[name]}",
+                f"{100.0 * earlier.median_relative_error:.2g}",
+                f"{100.0 * later.median_relative_error:.2g}",
+                f"{earlier.rms_z:.3g}",
+                f"{later.rms_z:.3g}",
                 f"{later.covered.count}/{later.covered.total}",
                 f"{100.0 * least:.1f}–{100.0 * most:.1f} %",
             )
@@ -268,22 +259,7 @@ def markdown(score: BlindScore, folder: str, figures: Sequence[str] = ("", "")) 
     """
     withheld = "".join(f" --exclude {name}" for name in score.excluded)
     drawn = f" --figure docs/{figures[0]}" if figures[0] else ""
-    making = []
-    if made := score.made_with:
-        kinds = ",".join(f"{kind}:{share:g}" for kind, share in made["kinds"].items())
-        making = [
-            f"tunnel blind make {folder} --count {made['count']} --seed {made['seed']} --kinds {kinds} "
-            f"--textbook {made['textbook']:g} --rare {made['rare']:g} "
-            f"--variety {made['variety']:g} --small {made['small']:g}"
-            + (f" --departures {made['departures']:g}" if made["departures"] else "")
-            + f" --scatter {made.get('scatter', 0.0):g}"
-            + (
-                f" --scatter-level {made['scatter_level']} --scatter-normal {made['scatter_normal']:g}"
-                f" --stated {made['stated']:g}"
-                if made.get("scatter")
-                else ""
-            )
-        ]
+    making = [] if score.made_with is None else [f"tunnel blind make {folder} {_options(score.made_with)}"]
     about_scatter = _ABOUT_SCATTER if score.scatter() else ""
     commands = [
         *making,
@@ -311,6 +287,21 @@ def markdown(score: BlindScore, folder: str, figures: Sequence[str] = ("", "")) 
         Paragraph(f"Columns: {', '.join(f'{number} {name}' for name, number in numbers.items())}."),
     ]
     return "\n".join(head) + "\n\n" + as_markdown(blocks)
+
+
+def _options(made: MadeWith) -> str:
+    """The options of ``tunnel blind make`` that made a set."""
+    kinds = ",".join(f"{kind}:{share:g}" for kind, share in made.kinds.items())
+    words = f"--count {made.count} --seed {made.seed} --kinds {kinds}"
+    shares = {"textbook": made.textbook, "rare": made.rare, "variety": made.variety, "small": made.small}
+    shares |= {"departures": made.departures} if made.departures else {}
+    words += (
+        "".join(f" --{name} {share:g}" for name, share in shares.items()) + f" --scatter {made.scatter:g}"
+    )
+    if made.scatter:
+        words += f" --scatter-level {made.scatter_level} --scatter-normal {made.scatter_normal:g}"
+        words += f" --stated {made.stated:g}"
+    return words
 
 
 _HEAD = """# Blind check

@@ -25,7 +25,9 @@ from tunnel_lab.experiments.blind.cases import (
 from tunnel_lab.experiments.blind.scatter_score import ScatterScore, scatter_score
 from tunnel_lab.experiments.blind.sets import (
     KEY,
+    MADE_WITH,
     SEAL,
+    MadeWith,
     campaign_folders,
     file_hash,
     folder_hash,
@@ -187,16 +189,16 @@ class CoefficientErrors:
         name: ``cn_beta`` or ``cn_r``.
         when: ``before`` or ``after`` the causes are added.
         covered: number of 95 % intervals that contain the truth.
-        spread: root mean square of the errors in stated standard deviations; 1 for right standard deviations.
-        median: median absolute error as a share of the truth.
+        rms_z: root mean square of the errors in stated standard deviations; 1 for right standard deviations.
+        median_relative_error: median absolute error as a share of the truth.
     """
 
     group: str
     name: str
     when: str
     covered: Proportion
-    spread: float
-    median: float
+    rms_z: float
+    median_relative_error: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,7 +210,7 @@ class BlindScore:
         excluded: effects withheld from the vocabulary.
         key_sha256: published hash of the key; empty for an open set.
         answers_sha256: hash over the answers, published before the key was opened.
-        made_with: arguments of `make_blind`; empty if unknown.
+        made_with: arguments of `make_blind`; None if unknown.
         sealed: whether the truth was sealed; else it was beside the data, and the test is not blind.
     """
 
@@ -216,7 +218,7 @@ class BlindScore:
     excluded: tuple[str, ...]
     key_sha256: str
     answers_sha256: str
-    made_with: dict[str, Any]
+    made_with: MadeWith | None
     sealed: bool
 
     def exact(self) -> dict[str, Proportion]:
@@ -276,7 +278,7 @@ class BlindScore:
         known = [(p, right) for p, right in given if p is not None]
         return calibration([p for p, _ in known], [right for _, right in known])
 
-    def found(self) -> list[CausesFound]:
+    def causes_found(self) -> dict[str, CausesFound]:
         """True causes found and false ones named, by number of causes and by circumstances."""
         return found_by_group(self.cases)
 
@@ -299,7 +301,7 @@ class BlindScore:
 
     def scatter(self) -> ScatterScore | None:
         """Scatter between runs found; None where no campaign has any and none is named."""
-        asked = any(c.scatter.widths or c.named_scatter for c in self.cases)
+        asked = any(c.widths or c.named_scatter for c in self.cases)
         return scatter_score(self.cases) if asked else None
 
     def closure(self) -> tuple[Proportion, float, float]:
@@ -352,30 +354,26 @@ class BlindScore:
             "sealed": self.sealed,
             "key_sha256": self.key_sha256,
             "answers_sha256": self.answers_sha256,
-            "made_with": self.made_with,
+            "made_with": {} if self.made_with is None else as_json(self.made_with),
             "excluded": list(self.excluded),
             "exact": as_json(self.exact()),
             "confusion": self.confusion(),
             "pairs": self.pairs(),
             "calibration": {"error": error, "bins": as_json(bins)},
-            "found": {found.group: found.to_json_dict() for found in self.found()},
+            "found": as_json(self.causes_found()),
             "inclusion_calibration": as_json(self.inclusion()),
             "scatter": as_json(self.scatter()),
             "false_alarms": as_json(self.false_alarms()),
             "missed": as_json(self.missed()),
             "rivals_named": as_json(self.rivals()),
             "closure": {"at_least_0.95": share.to_json_dict(), "median": median, "percentile_5": low},
-            "coefficients": [
-                {"group": e.group, "name": e.name, "when": e.when, "covered": e.covered.to_json_dict(),
-                 "rms_z": e.spread, "median_relative_error": e.median}
-                for e in self.coefficients()
-            ],
+            "coefficients": as_json(self.coefficients()),
             "seconds": dict(zip(("median", "percentile_90", "largest"), times, strict=True)),
             "cases": [
                 {"name": c.name, "truth": list(c.truth), "small": list(c.small),
                  "causes": None if c.causes is None else list(c.causes),
-                 "probability": c.probability, "right": c.right, "severity": c.severity,
-                 "scatter": dict(c.scatter.widths), "scatter_named": sorted(c.named_scatter)}
+                 "probability": c.probability, "right": c.right, "severity": c.stated.severity,
+                 "scatter": c.widths, "scatter_named": sorted(c.named_scatter)}
                 for c in self.cases
             ],
         }  # fmt: skip
@@ -420,27 +418,12 @@ def score_set(
                 "is not the key that was sealed", where=str(source), remedy="name the right one: --key"
             )
         with as_described("is not a key", shown(source), "name the key with --key"):
-            truths, made_with = dict(document["truths"]), document["made_with"] or {}
-            if made_with:
-                made_with = {
-                    **made_with,
-                    "count": int(made_with["count"]),
-                    "seed": int(made_with["seed"]),
-                    "kinds": {str(kind): float(share) for kind, share in made_with["kinds"].items()},
-                    "textbook": float(made_with["textbook"]),
-                    "rare": float(made_with["rare"]),
-                    "variety": float(made_with.get("variety", 0.0)),
-                    "small": float(made_with.get("small", 0.0)),
-                    "departures": float(made_with.get("departures", 0.0)),
-                    "scatter": float(made_with.get("scatter", 0.0)),
-                    "scatter_level": str(made_with.get("scatter_level", "mixed")),
-                    "stated": float(made_with.get("stated", 0.5)),
-                    "scatter_normal": float(made_with.get("scatter_normal", 0.5)),
-                }
+            truths, given = dict(document["truths"]), document["made_with"]
+            made_with = MADE_WITH.validate_python(given) if given else None
     else:
         open_truth = "seal the set (tunnel blind make) or put a truth.json into every campaign"
         truths = {path.name: read_json(path / "truth.json", remedy=open_truth) for path in campaigns}
-        key_sha256, made_with = "", {}
+        key_sha256, made_with = "", None
     cases = []
     for path in campaigns:
         said = scored(answers[path.name], shown(path))
@@ -461,10 +444,10 @@ def _checked_answers(
     )
     again += "" if effects_file is None else f" --effects-file {shown(effects_file)}"
     hashes = read_hashes(target / SEAL, "answers_sha256", again)
-    left = [path.name for path in campaigns if path.name not in hashes]
-    if left:
+    unanswered = [path.name for path in campaigns if path.name not in hashes]
+    if unanswered:
         raise TunnelError(
-            f"{len(left)} of {counted(len(campaigns), 'campaign')} without an answer",
+            f"{len(unanswered)} of {counted(len(campaigns), 'campaign')} without an answer",
             where=str(target),
             remedy=again,
         )

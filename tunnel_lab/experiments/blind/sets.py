@@ -9,13 +9,17 @@ from __future__ import annotations
 import hashlib
 import secrets
 from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
+
+from pydantic import TypeAdapter
 
 from tunnel_lab.experiments.runner import Progress
 from tunnel_reference.draw import DEFAULT_SHARES, Mixture, redraw
 from tunnel_reference.in_phase import in_phase
 from tunnel_reference.make import as_campaign, draw_set, simulate_set, truth_of
+from tunnel_reference.scatter_draws import MIXED
 from tunnel_reference.severity import ATTEMPTS, Simulated
 from tunnel_sim.files.campaign_folder import write_campaign
 from tunnel_sim.files.reading import read_json, read_regular
@@ -27,6 +31,37 @@ SCHEMA_VERSION = 1
 SEAL = "seal.json"
 KEY = "key.json"
 _CAMPAIGN = "campaign.toml"
+
+
+@dataclass(frozen=True)
+class MadeWith:
+    """The arguments of `make_blind` in the key; the defaults are for keys of earlier versions."""
+
+    count: int
+    seed: int
+    kinds: dict[str, float]
+    textbook: float
+    rare: float
+    variety: float = 0.0
+    small: float = 0.0
+    driven: bool = False
+    departures: float = 0.0
+    scatter: float = 0.0
+    scatter_level: str = MIXED
+    stated: float = 0.5
+    scatter_normal: float = 0.5
+
+    @classmethod
+    def of(cls, count: int, seed: int, kinds: Mapping[str, float], mixture: Mixture) -> MadeWith:
+        """The arguments as the key states them."""
+        names = {"level": "scatter_level", "normal": "scatter_normal"}
+        known = {one.name for one in fields(cls)}
+        given = {names.get(name, name): value for name, value in vars(mixture).items()}
+        shares = {name: value for name, value in given.items() if name in known}
+        return cls(count, seed, dict(kinds), **shares)
+
+
+MADE_WITH = TypeAdapter(MadeWith)
 
 
 def write_document(path: Path, document: Mapping[str, Any]) -> str:
@@ -137,21 +172,7 @@ def make_blind(
         document = {
             "schema_version": SCHEMA_VERSION,
             "salt": secrets.token_hex(32),
-            "made_with": {
-                "count": count,
-                "seed": seed,
-                "kinds": dict(shares),
-                "textbook": mixture.textbook,
-                "rare": mixture.rare,
-                "variety": mixture.variety,
-                "small": mixture.small,
-                "driven": mixture.driven,
-                "departures": mixture.departures,
-                "scatter": mixture.scatter,
-                "scatter_level": mixture.level,
-                "stated": mixture.stated,
-                "scatter_normal": mixture.normal,
-            },
+            "made_with": asdict(MadeWith.of(count, seed, shares, mixture)),
             "truths": truths,
         }
         sealed = write_document(partial / KEY if key is None else key, document)

@@ -7,7 +7,15 @@ import numpy as np
 import pytest
 
 from identification.neural.posterior import TrainedPosterior, forward, to_bytes, trained_of
-from tunnel_lab.experiments.training import INPUTS, FitSpec, contexts, fit, judged, losses, start_state
+from tunnel_lab.experiments.training import (
+    INPUTS,
+    ShardedTraining,
+    contexts,
+    fit,
+    judged,
+    losses,
+    start_state,
+)
 from tunnel_reference.forms import FAMILIES
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -44,7 +52,7 @@ def made_up(count=300, seed=1):
 
 @pytest.fixture(scope="module")
 def fitted():
-    samples, spec = made_up(), FitSpec(seed=3, steps=60, batch=32)
+    samples, spec = made_up(), ShardedTraining(seed=3, steps=60)
     return samples, spec, fit(samples, spec, start_state(samples, spec))
 
 

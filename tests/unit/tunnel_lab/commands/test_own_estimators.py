@@ -21,7 +21,7 @@ from tunnel_lab.experiments.experiment import run_in
 from tunnel_lab.experiments.runner import processes
 from tunnel_lab.experiments.score import score_grid
 from tunnel_lab.experiments.score_grid import load_grid
-from tunnel_lab.experiments.sweep import read_sweep
+from tunnel_lab.experiments.sweep import read_sweep, sweep_of
 from tunnel_sim import TunnelError
 
 MODULE = '''
@@ -219,7 +219,7 @@ def test_what_a_class_does_not_give_is_not_a_failure(tunnel) -> None:
 def test_a_sweep_and_a_score_leave_out_the_same(tunnel, folder: Path) -> None:
     sys.path.insert(0, str(folder))
     names = [estimators.register_from(f"own_method:{kind}") for kind in ("Bare", "Mine")]
-    run_in(read_sweep(folder / "small.toml", names).experiment, folder / "out", processes(0))
+    run_in(sweep_of(read_sweep(folder / "small.toml", names)), folder / "out", processes(0))
     status, out, err = tunnel("sweep", "--summary", "out")
     assert (status, err) == (0, "")
     assert "Not given by bare: ζ, zero.\n" in out
@@ -258,7 +258,7 @@ def test_a_wrong_return_is_one_line_in_every_command(tunnel, tiny_campaign: Path
 def test_a_wrong_return_fails_a_sweep(folder: Path) -> None:
     sys.path.insert(0, str(folder))
     names = [estimators.register_from(f"own_method:{kind}") for kind in ("NotANumber", "Mine")]
-    store, outcome = run_in(read_sweep(folder / "small.toml", names).experiment, folder / "out", processes(0))
+    store, outcome = run_in(sweep_of(read_sweep(folder / "small.toml", names)), folder / "out", processes(0))
     (failed,) = outcome.failed
     assert (failed.status, failed.of_the_estimator) == ("wrong_return", True)
     rows = store.scan().collect().filter(estimator="not_a_number")

@@ -8,7 +8,8 @@ import pytest
 
 from tests.support.small_sweep import SMALL
 from tunnel_lab.experiments.experiment import ONE_THREAD
-from tunnel_lab.experiments.sweep import Sweep, read_sweep
+from tunnel_lab.experiments.sweep import read_sweep
+from tunnel_lab.experiments.sweep_cases import Sweep
 
 
 @pytest.fixture

@@ -46,7 +46,7 @@ def test_friction_biases_damping_and_nothing_biases_none(found):
 
 
 def test_estimators_that_give_no_coefficient_are_refused():
-    rows = [("no effect", 0.0, "hilbert", name, None, "ok") for name in work.QUANTITIES]
+    rows = [("no effect", 0.0, "hilbert", name, None, "ok") for name in work.PARAMETERS]
     columns = ("effect", "severity", "estimator", "quantity", "value", "status")
     results = pl.DataFrame(rows, schema=columns, schema_overrides={"value": pl.Float64}, orient="row")
     with pytest.raises(TunnelError, match="give none of cn_beta"):

@@ -17,12 +17,13 @@ import polars as pl
 import pytest
 
 from tests.support.killed import names_of_the_dead
-from tests.support.small_sweep import SMALL, contents
+from tests.support.small_sweep import SMALL, contents, open_store
 from tunnel_lab.experiments import experiment as engine
 from tunnel_lab.experiments import sweep_work
 from tunnel_lab.experiments.experiment import begin, run_in
 from tunnel_lab.experiments.runner import processes
-from tunnel_lab.experiments.sweep import Sweep, open_store, read_sweep
+from tunnel_lab.experiments.sweep import read_sweep, sweep_of
+from tunnel_lab.experiments.sweep_cases import Sweep
 from tunnel_sim.vocabulary.errors import TunnelError
 
 ROOT = Path(__file__).parents[4]
@@ -53,14 +54,14 @@ def running(group: int) -> bool:
 
 def test_killed_and_resumed_is_the_same_to_the_bit(small: Path, sweep: Sweep, here, tmp_path: Path) -> None:
     """Against a sweep that nobody disturbed, in one process and in another order."""
-    run_in(sweep.experiment, tmp_path / "whole", here)
+    run_in(sweep_of(sweep), tmp_path / "whole", here)
     process = started(small, tmp_path / "killed")
     process.kill()
     process.communicate()
     finished = {path: path.stat().st_mtime_ns for path in (tmp_path / "killed").glob("results/part-*")}
     assert 0 < len(finished) < sweep.shards, "killed too late to say anything"
-    _, outcome = run_in(sweep.experiment, tmp_path / "killed", here)
-    assert outcome.found == len(finished)
+    _, outcome = run_in(sweep_of(sweep), tmp_path / "killed", here)
+    assert outcome.finished_before == len(finished)
     assert {path: path.stat().st_mtime_ns for path in finished} == finished  # nothing was done twice
     assert contents(tmp_path / "killed") == contents(tmp_path / "whole")
     cases = open_store(tmp_path / "killed").scan().select("case").collect()["case"]
@@ -85,7 +86,7 @@ def test_ctrl_c_keeps_what_is_finished(small: Path, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_lost_process_costs_nothing(sweep: Sweep, here, tmp_path: Path) -> None:
-    run_in(sweep.experiment, tmp_path / "whole", here)
+    run_in(sweep_of(sweep), tmp_path / "whole", here)
     said: list[str] = []
     killed: list[int] = []
 
@@ -96,7 +97,7 @@ def test_a_lost_process_costs_nothing(sweep: Sweep, here, tmp_path: Path) -> Non
             killed.append(int(mine[0]))
             os.kill(killed[0], signal.SIGKILL)
 
-    run_in(sweep.experiment, tmp_path / "out", processes(2, said.append), kill_one)
+    run_in(sweep_of(sweep), tmp_path / "out", processes(2, said.append), kill_one)
     assert said == ["a worker process was lost; its tasks are repeated"]
     assert contents(tmp_path / "out") == contents(tmp_path / "whole")
 
@@ -129,8 +130,8 @@ def test_stopped_or_out_of_disk_at_the_beginning_it_continues(
         for name in ("output_folder", "write_json"):
             patch.setattr(engine, name, failing(getattr(engine, name)))
         with pytest.raises(TunnelError, match="no space left"):
-            begin(sweep.experiment, tmp_path / "out")
-    store = begin(sweep.experiment, tmp_path / "out")
+            begin(sweep_of(sweep), tmp_path / "out")
+    store = begin(sweep_of(sweep), tmp_path / "out")
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(
         ["sweep.json", "results", "records", "checksums"]
     )
@@ -138,18 +139,18 @@ def test_stopped_or_out_of_disk_at_the_beginning_it_continues(
 
 
 def test_half_a_part_is_done_again(sweep: Sweep, here, tmp_path: Path) -> None:
-    store, _ = run_in(sweep.experiment, tmp_path / "out", here)
+    store, _ = run_in(sweep_of(sweep), tmp_path / "out", here)
     whole = contents(tmp_path / "out")
     part = tmp_path / "out" / "results" / "part-00004.parquet"
     part.write_bytes(part.read_bytes()[:-100])  # a disk that was full, or lost its power
     names_of_the_dead(part.with_name("part-00005.parquet"))[0].write_bytes(b"PAR1")
     assert "part-00004" not in store.finished()
-    assert run_in(sweep.experiment, tmp_path / "out", here)[1].found == 11
+    assert run_in(sweep_of(sweep), tmp_path / "out", here)[1].finished_before == 11
     assert contents(tmp_path / "out") == whole
 
 
 def test_a_changed_file_is_refused_and_a_comment_is_no_change(sweep: Sweep, here, tmp_path: Path) -> None:
-    run_in(sweep.experiment, tmp_path / "out", here)
+    run_in(sweep_of(sweep), tmp_path / "out", here)
     before = contents(tmp_path / "out")
     for text, said in (
         (SMALL.replace("seed = 1", "seed = 2"), "another sweep, whose seed differs"),
@@ -157,9 +158,11 @@ def test_a_changed_file_is_refused_and_a_comment_is_no_change(sweep: Sweep, here
     ):
         (tmp_path / "changed.toml").write_text(text, encoding="utf-8")
         with pytest.raises(TunnelError, match=said):
-            run_in(read_sweep(tmp_path / "changed.toml").experiment, tmp_path / "out", here)
+            run_in(sweep_of(read_sweep(tmp_path / "changed.toml")), tmp_path / "out", here)
     (tmp_path / "same.toml").write_text("# a comment\n" + SMALL.replace("0.0002", "2e-4"), encoding="utf-8")
-    assert run_in(read_sweep(tmp_path / "same.toml").experiment, tmp_path / "out", here)[1].found == 12
+    assert (
+        run_in(sweep_of(read_sweep(tmp_path / "same.toml")), tmp_path / "out", here)[1].finished_before == 12
+    )
     assert contents(tmp_path / "out") == before
 
 
@@ -168,12 +171,12 @@ def test_other_versions_are_refused(
 ) -> None:
     with monkeypatch.context() as patch:
         patch.setattr(engine, "versions", lambda: {"numpy": "1.0"})
-        run_in(sweep.experiment, tmp_path / "old", lambda *_: (one for one in ()))
+        run_in(sweep_of(sweep), tmp_path / "old", lambda *_: (one for one in ()))
     with pytest.raises(TunnelError, match=r"begun with numpy 1\.0"):
-        run_in(sweep.experiment, tmp_path / "old", here)
+        run_in(sweep_of(sweep), tmp_path / "old", here)
     monkeypatch.setenv("OMP_NUM_THREADS", "4")
     with pytest.raises(TunnelError, match="a worker has threads 4, but this sweep uses 1"):
-        run_in(sweep.experiment, tmp_path / "new", here)
+        run_in(sweep_of(sweep), tmp_path / "new", here)
     assert open_store(tmp_path / "new").finished() == set()
 
 
@@ -186,7 +189,7 @@ def test_a_case_that_cannot_be_simulated_takes_no_other_with_it(tmp_path: Path, 
     )
     text = text.replace("replicates = 2", "replicates = 1").replace("per_shard = 1", "per_shard = 24")
     (tmp_path / "wild.toml").write_text(text, encoding="utf-8")
-    rows = run_in(read_sweep(tmp_path / "wild.toml").experiment, tmp_path / "out", here)[0].scan().collect()
+    rows = run_in(sweep_of(read_sweep(tmp_path / "wild.toml")), tmp_path / "out", here)[0].scan().collect()
     failed = rows.filter(pl.col("status") == "not_simulated")
     assert set(failed["cn_beta"]) == {5.0}
     assert failed["value"].null_count() == len(failed)
@@ -204,7 +207,7 @@ def test_an_estimator_that_crashes_is_a_status(
             raise ZeroDivisionError("planted")
 
     monkeypatch.setattr(sweep_work, "_estimator", lambda _: Broken())
-    store, outcome = run_in(sweep.experiment, tmp_path / "out", here)
+    store, outcome = run_in(sweep_of(sweep), tmp_path / "out", here)
     (failed,) = outcome.failed
     assert (failed.status, failed.count) == ("raised", 12)
     rows = store.scan().collect()
@@ -230,17 +233,17 @@ def damages(first: Path, second: Path) -> Iterator[None]:
 @pytest.mark.slow
 def test_a_part_damaged_anywhere_is_done_again(sweep: Sweep, here, tmp_path: Path) -> None:
     """Not only where its end is missing: a disk may lose a block in the middle."""
-    store, _ = run_in(sweep.experiment, tmp_path / "out", here)
+    store, _ = run_in(sweep_of(sweep), tmp_path / "out", here)
     whole = contents(tmp_path / "out")
     for dataset in ("results", "records", "checksums"):
         for _ in damages(*sorted((tmp_path / "out" / dataset).iterdir())[:2]):
-            assert store.finished() == set(map(sweep.experiment.name, range(1, sweep.shards)))
-            assert run_in(sweep.experiment, tmp_path / "out", here)[1].found == sweep.shards - 1
+            assert store.finished() == set(map(sweep_of(sweep).name, range(1, sweep.shards)))
+            assert run_in(sweep_of(sweep), tmp_path / "out", here)[1].finished_before == sweep.shards - 1
             assert contents(tmp_path / "out") == whole
 
 
 def test_checksums_are_those_of_sha256sum(sweep: Sweep, here, tmp_path: Path) -> None:
-    run_in(sweep.experiment, tmp_path / "out", here)
+    run_in(sweep_of(sweep), tmp_path / "out", here)
     names = [f"checksums/{path.name}" for path in (tmp_path / "out" / "checksums").iterdir()]
     done = subprocess.run(
         ["sha256sum", "--check", *names], cwd=tmp_path / "out", capture_output=True, text=True, check=False
@@ -256,7 +259,7 @@ def test_checksums_are_those_of_sha256sum(sweep: Sweep, here, tmp_path: Path) ->
 def test_a_sweep_json_that_is_incomplete_is_one_line(
     sweep: Sweep, tmp_path: Path, key: str, value: object
 ) -> None:
-    begin(sweep.experiment, tmp_path / "out")
+    begin(sweep_of(sweep), tmp_path / "out")
     path = tmp_path / "out" / "sweep.json"
     document = json.loads(path.read_text(encoding="utf-8"))
     if value == "gone":
@@ -268,6 +271,6 @@ def test_a_sweep_json_that_is_incomplete_is_one_line(
     ):
         return  # still what a folder may hold
     path.write_text(json.dumps(document), encoding="utf-8")
-    for read in (open_store, lambda folder: begin(sweep.experiment, folder)):
+    for read in (open_store, lambda folder: begin(sweep_of(sweep), folder)):
         with pytest.raises(TunnelError, match=r"the sweep as JSON|sweep\.json"):
             read(tmp_path / "out")

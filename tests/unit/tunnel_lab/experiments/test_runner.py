@@ -30,7 +30,7 @@ def test_the_rest_is_done_and_counted_by_its_weight() -> None:
     kept = Kept({"2": squared(2)})
     seen: list[tuple[int, int]] = []
     outcome = run(squares(1, 2, 3), kept, processes(0), lambda *now: seen.append(now))
-    assert outcome.found == 1
+    assert outcome.finished_before == 1
     assert {name: done.files["results"] for name, done in kept.items()} == {"1": b"1", "2": b"4", "3": b"9"}
     assert seen == [(2, 6), (3, 6), (6, 6)]
 

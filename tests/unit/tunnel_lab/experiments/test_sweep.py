@@ -14,7 +14,8 @@ import tomli_w
 from tests.support.small_sweep import SMALL
 from tunnel_lab.experiments import sweep_work
 from tunnel_lab.experiments.estimate_rows import Failure
-from tunnel_lab.experiments.sweep import Sweep, read_sweep
+from tunnel_lab.experiments.sweep import read_sweep
+from tunnel_lab.experiments.sweep_cases import Sweep
 from tunnel_lab.experiments.sweep_view import lines_of
 from tunnel_lab.experiments.sweep_work import NOT_SIMULATED, run_shard
 from tunnel_sim.engine.virtual_campaign import simulate_campaign

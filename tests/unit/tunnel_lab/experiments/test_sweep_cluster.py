@@ -16,7 +16,8 @@ from tests.support.small_sweep import contents
 from tunnel_lab.cli import main
 from tunnel_lab.experiments.experiment import run_in
 from tunnel_lab.experiments.runner import on_cluster
-from tunnel_lab.experiments.sweep import Sweep
+from tunnel_lab.experiments.sweep import sweep_of
+from tunnel_lab.experiments.sweep_cases import Sweep
 
 ROOT = Path(__file__).parents[4]
 WORKERS = 3
@@ -58,7 +59,7 @@ def worker(address: str) -> subprocess.Popen[bytes]:
 def test_workers_missing_and_lost_are_survived(
     sweep: Sweep, here, tmp_path: Path, address: str, processes: list[subprocess.Popen[bytes]]
 ) -> None:
-    run_in(sweep.experiment, tmp_path / "alone", here)
+    run_in(sweep_of(sweep), tmp_path / "alone", here)
     said: list[str] = []
     killed: list[int] = []
 
@@ -73,7 +74,7 @@ def test_workers_missing_and_lost_are_survived(
             killed.append(done)
 
     store, _ = run_in(
-        sweep.experiment, tmp_path / "cluster", on_cluster(address, 1, say, poll_s=1.0), kill_one
+        sweep_of(sweep), tmp_path / "cluster", on_cluster(address, 1, say, poll_s=1.0), kill_one
     )
     assert said[0].startswith("no worker is connected to tcp://")
     assert killed
@@ -104,7 +105,7 @@ def test_a_scheduler_that_goes_away_is_one_line(
 
 
 def test_a_local_cluster_gives_the_same(small: Path, sweep: Sweep, here, tmp_path: Path) -> None:
-    run_in(sweep.experiment, tmp_path / "alone", here)
+    run_in(sweep_of(sweep), tmp_path / "alone", here)
     command = [
         sys.executable,
         "-m",

@@ -17,7 +17,8 @@ from tests.support.small_sweep import SMALL
 from tunnel_lab.cli import main
 from tunnel_lab.experiments import runner, sweep_view
 from tunnel_lab.experiments.experiment import run_in
-from tunnel_lab.experiments.sweep import Sweep, read_sweep
+from tunnel_lab.experiments.sweep import read_sweep, sweep_of
+from tunnel_lab.experiments.sweep_cases import Sweep
 from tunnel_lab.experiments.sweep_view import ScoreLine, lines_of, summarise
 from tunnel_lab.experiments.sweep_work import RESULT_COLUMNS, SCATTER_COLUMNS
 
@@ -113,7 +114,7 @@ def test_the_file_in_the_help_is_read(tmp_path: Path, capsys: pytest.CaptureFixt
 def test_the_summary_of_a_sweep(
     sweep: Sweep, here, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    run_in(sweep.experiment, tmp_path / "out", here)
+    run_in(sweep_of(sweep), tmp_path / "out", here)
     assert unheard("sweep", "--summary", tmp_path / "out") == 0
     assert len(list((tmp_path / "out" / "summary").iterdir())) == 8  # written before the first word
     shutil.rmtree(tmp_path / "out" / "summary")
@@ -283,7 +284,7 @@ def test_a_sweep_without_estimators_has_no_summary(
 ) -> None:
     text = SMALL.replace('["conventional"]', "[]").replace("replicates = 2", "replicates = 1")
     (tmp_path / "only.toml").write_text(text[: text.index("[[effects]]")], encoding="utf-8")
-    run_in(read_sweep(tmp_path / "only.toml").experiment, tmp_path / "out", here)
+    run_in(sweep_of(read_sweep(tmp_path / "only.toml")), tmp_path / "out", here)
     assert main(["sweep", "--summary", str(tmp_path / "out")]) == 2
     assert "the sweep has no estimators" in capsys.readouterr().err
 
@@ -292,7 +293,7 @@ def test_what_runs_cannot_give_is_no_failure(here, tmp_path: Path) -> None:
     """The conventional method estimates no zero: it has no line; wind-off runs give no Cnβ: nor has that."""
     text = SMALL.replace("[0.0, 15.0]", "[0.0]")
     (tmp_path / "off.toml").write_text(text[: text.index("[[effects]]")], encoding="utf-8")
-    lines = summarise(run_in(read_sweep(tmp_path / "off.toml").experiment, tmp_path / "out", here)[0].scan())
+    lines = summarise(run_in(sweep_of(read_sweep(tmp_path / "off.toml")), tmp_path / "out", here)[0].scan())
     assert {"omega_n", "zeta"} <= {line.quantity for line in lines}
     assert not {"cn_beta", "cn_r", "sensor_zero"} & {line.quantity for line in lines}
     assert all(line.score.failures.count == 0 for line in lines)

@@ -10,7 +10,7 @@ import polars as pl
 import pytest
 
 from tunnel_lab.experiments.experiment import run_in
-from tunnel_lab.experiments.sweep import read_sweep
+from tunnel_lab.experiments.sweep import read_sweep, sweep_of
 from tunnel_lab.experiments.sweep_work import RESULT_COLUMNS
 
 PAGE = Path(__file__).parents[4] / "docs" / "how-to" / "sweep.md"
@@ -34,7 +34,7 @@ def test_the_file_is_read_and_the_code_runs(here, tmp_path: Path, monkeypatch: p
         "coefficient = 0.002", "coefficient = [0.002, 0.003, 0.004, 0.005, 0.006]"
     )
     (tmp_path / "sweep.toml").write_text(small, encoding="utf-8")
-    store, _ = run_in(read_sweep(tmp_path / "sweep.toml").experiment, tmp_path / "results", here)
+    store, _ = run_in(sweep_of(read_sweep(tmp_path / "sweep.toml")), tmp_path / "results", here)
     monkeypatch.chdir(tmp_path)
     found: dict[str, object] = {}
     for code in blocks("python"):

@@ -16,11 +16,12 @@ from identification.neural.networks import read_networks, shipped_record
 from identification.neural.train import Checkpoint, read_checkpoint
 from identification.show.quantity import Quantity
 from identification.uncertainty.budget import load_uncertainties
+from tests.support.small_sweep import open_store
 from tunnel_lab.commands.paper import read_spring_table
 from tunnel_lab.experiments.blind.sets import file_hash, read_hashes
 from tunnel_lab.experiments.score import read_trials
 from tunnel_lab.experiments.score_grid import load_grid
-from tunnel_lab.experiments.sweep import open_store, read_sweep
+from tunnel_lab.experiments.sweep import read_sweep
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.files.plan_file import load_plan
 from tunnel_sim.files.reading import check_count, parse_json, read_json, read_regular

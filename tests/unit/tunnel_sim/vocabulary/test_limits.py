@@ -18,7 +18,8 @@ from tests.support.small_sweep import SMALL
 from tunnel_lab.experiments.runner import processes
 from tunnel_lab.experiments.score import score_grid
 from tunnel_lab.experiments.score_grid import load_grid, packaged_grid
-from tunnel_lab.experiments.sweep import Sweep, read_sweep
+from tunnel_lab.experiments.sweep import read_sweep
+from tunnel_lab.experiments.sweep_cases import Sweep
 from tunnel_sim.engine.virtual_campaign import run_settings
 from tunnel_sim.files.plan_file import first_twice, load_plan, paper_plan
 from tunnel_sim.physics.run_settings import sampling

@@ -70,7 +70,7 @@ def test_scatter_is_counted_as_by_hand():
     assert found.false_alarms == Proportion(1, 3)
     assert found.exact == Proportion(7, 11)
     assert found.exact_repeating == Proportion(2, 3)
-    by_number = {one.number: one for one in found.by_number}
+    by_number = found.by_number
     assert list(by_number) == ["wind_speed", "spring_stiffness", "mechanical_damping", "all"]
     speed, spring, damping = (by_number[name] for name in THREE)
     # of normal campaigns whose speed scatters unstated: three say so, two of them by naming a cause
@@ -88,7 +88,7 @@ def test_scatter_is_counted_as_by_hand():
 
 
 def test_the_causes_are_counted_without_scatter():
-    groups = {one.group: one for one in found_by_group(CASES)}
+    groups = found_by_group(CASES)
     assert groups["one cause beside scatter"].exact == Proportion(2, 3)
     assert groups["one cause beside scatter"].false == Proportion(0, 2)
     assert groups["runs that repeat"].exact == Proportion(2, 3)
@@ -103,7 +103,7 @@ def test_the_causes_are_counted_without_scatter():
 
 
 def test_scatter_has_tables_and_figures_of_its_own():
-    score = BlindScore(CASES, (), "k", "a", {}, True)
+    score = BlindScore(CASES, (), "k", "a", None, True)
     titles = [section.title for section in blind.sections(score)]
     assert {"Scatter between runs", "Widths of the scatter"} <= set(titles)
     page = blind.markdown(score, "set")
@@ -115,7 +115,7 @@ def test_scatter_has_tables_and_figures_of_its_own():
 
 
 def test_a_set_whose_runs_repeat_says_nothing_of_scatter():
-    score = BlindScore((made([], []), made(["free_play"], ["free_play"])), (), "k", "a", {}, True)
+    score = BlindScore((made([], []), made(["free_play"], ["free_play"])), (), "k", "a", None, True)
     assert score.scatter() is None
     assert "catter" not in blind.markdown(score, "set").replace("runs that repeat", "")
     assert score.to_json_dict()["scatter"] is None
@@ -124,10 +124,10 @@ def test_a_set_whose_runs_repeat_says_nothing_of_scatter():
 def test_where_no_width_is_asked_for_none_are_shown():
     drifting = made([], ["unknown"], widths=SPEED, form="drifting")  # another form counts for the causes only
     titles = [
-        one.title for one in blind.sections(BlindScore((drifting, made([], [])), (), "k", "a", {}, True))
+        one.title for one in blind.sections(BlindScore((drifting, made([], [])), (), "k", "a", None, True))
     ]
     assert "Scatter between runs" in titles
     assert "Widths of the scatter" not in titles
-    every = blind.sections(BlindScore(CASES, (), "k", "a", {}, True))
+    every = blind.sections(BlindScore(CASES, (), "k", "a", None, True))
     (widths,) = (one for one in every if one.title == "Widths of the scatter")
     assert [row[0] for row in widths.rows] == ["wind speed", "spring stiffness", "mechanical damping", "all"]

@@ -65,7 +65,7 @@ def score():
         case(f"c{i}", {**TRUTH, "effects": truth}, told(said, probability=p))
         for i, (truth, said, p) in enumerate(SAID)
     )
-    return BlindScore(cases, (), "k", "a", {}, True)
+    return BlindScore(cases, (), "k", "a", None, True)
 
 
 def test_counts_are_those_made_by_hand(score):
@@ -113,9 +113,9 @@ def test_errors_of_coefficients_are_in_standard_deviations():
     beta, rate = one.error("cn_beta", "after"), one.error("cn_r", "before")
     assert (beta.stds, beta.share) == pytest.approx((2.5, 0.0025 / 0.45))
     assert (rate.stds, rate.share) == pytest.approx((-4.0, -0.004 / 0.12))
-    found = {(e.group, e.name, e.when): e for e in BlindScore((one,), (), "", "", {}, False).coefficients()}
+    found = {(e.group, e.name, e.when): e for e in BlindScore((one,), (), "", "", None, False).coefficients()}
     assert found["named rightly", "cn_beta", "after"].covered == Proportion(0, 1)
-    assert found["named rightly", "cn_beta", "after"].spread == pytest.approx(2.5)
+    assert found["named rightly", "cn_beta", "after"].rms_z == pytest.approx(2.5)
     said["coefficients"]["after"]["cn_beta"]["interval"] = [0.4499, 0.46]
     one = case("c", {**TRUTH, "effects": ["free_play"]}, scored(said, "c.json"))
     assert one.error("cn_beta", "after").covered
@@ -165,7 +165,7 @@ def test_times_are_on_the_page_where_they_are_known(score):
         case(f"c{i}", {**TRUTH, "effects": []}, scored(document([]) | {"wall_s": float(i)}, ""))
         for i in range(1, 12)
     )
-    (found,) = [s for s in blind.sections(BlindScore(timed, (), "", "", {}, False)) if s.title == title]
+    (found,) = [s for s in blind.sections(BlindScore(timed, (), "", "", None, False)) if s.title == title]
     assert found.rows == (("6.0", "10.0", "11.0"),)
 
 
