@@ -56,14 +56,19 @@ Calibration = tuple[PerSample, PerSample] | tuple[float, float]
 """Voltages and readings of a table; or offset and factor of a straight line."""
 
 
-def without_overflow(values: Rows) -> tuple[Rows, list[str]]:
-    """Readings of a counter or a single-turn sensor without jumps at the ends of its range; and remarks."""
+def without_overflow(values: Rows, turn: float | None = None) -> tuple[Rows, list[str]]:
+    """Readings of a counter or a single-turn sensor without jumps at the ends of its range; and remarks.
+
+    Args:
+        turn: a whole turn in the unit of the readings; None if it is not known.
+    """
     known = np.flatnonzero(np.isfinite(values))
     numbers = values[known]
     steps = np.diff(numbers)
     longest = float(np.abs(steps).max(initial=0.0))
     counts = longest >= _NEARLY * _COUNTERS[0] and bool((numbers == np.round(numbers)).all())
-    for full in (*_TURNS, *(_COUNTERS if counts else ())):
+    turns_by = _TURNS if turn is None else (turn,)
+    for full in (*turns_by, *(_COUNTERS if counts else ())):
         if not _NEARLY * full < longest <= full or np.ptp(numbers) > full:
             continue
         jumps = np.abs(steps) > _NEARLY * full
@@ -78,6 +83,12 @@ def without_overflow(values: Rows) -> tuple[Rows, list[str]]:
         result[known] = numbers + full * turns
         return result, [remark]
     return values, []
+
+
+def _turn_in(unit: str) -> float | None:
+    """A whole turn in a unit of angles; None of another unit."""
+    factor = UNITS["angle"].get(unit)
+    return None if factor is None else 2.0 * pi / factor
 
 
 def stated_unit(text: str | None, kinds: Sequence[str], option: str) -> str | None:
@@ -199,7 +210,7 @@ def in_radians(
             where=where,
             remedy=f"give --unit ({', '.join(UNITS['angle'])} or another), --counts-per-turn N or --calibration",
         )
-    values, remarks = without_overflow(timed)
+    values, remarks = without_overflow(timed, choices.counts_per_turn or _turn_in(unit))
     if not np.isfinite(values).any():
         what = f"{reading.quoted} holds no number where the file states a time"
         raise TunnelError(what, where=where, remedy="leave the file out, or name another column by --angle")
@@ -218,6 +229,8 @@ def in_radians(
             values = np.interp(volts, first, second)
         unit = unit if kind_of(unit) == "angle" else ""
         remarks.append(f"'{reading.name}' converted by the calibration")
+        values, overflowed = without_overflow(values, _turn_in(unit))
+        remarks += overflowed
     elif choices.counts_per_turn is not None:
         values, unit = values / choices.counts_per_turn, "turns"
         remarks.append(f"'{reading.name}' holds counts, {choices.counts_per_turn:g} per turn")

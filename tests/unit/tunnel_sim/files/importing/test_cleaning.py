@@ -184,6 +184,29 @@ def test_overflow_is_taken_out(full: float) -> None:
     assert "overflow" in said[0]
 
 
+@pytest.mark.parametrize(
+    ("heading", "full", "choices"),
+    [
+        ("angle [rev]", 1.0, ImportChoices()),
+        ("angle [gon]", 400.0, ImportChoices()),
+        ("angle [mrad]", 2000.0 * np.pi, ImportChoices()),
+        ("encoder [counts]", 4000.0, ImportChoices(counts_per_turn=4000.0)),
+        ("sensor [V]", 5.0, ImportChoices(calibration="72*V", unit="deg")),
+        ("sensor [V]", 5.0, ImportChoices(calibration="72*V")),
+    ],
+)
+def test_a_turn_has_the_length_that_it_has_in_its_unit(
+    heading: str, full: float, choices: ImportChoices, tmp_path: Path
+) -> None:
+    time, angle = decay()
+    turned = np.mod((angle + 0.1) / (2.0 * np.pi) * full, full)
+    turned = np.round(turned) if choices.counts_per_turn else turned
+    rows = "".join(f"{t:.3f},{y:.8f}\n" for t, y in zip(time, turned, strict=True))
+    (run,) = read_records([written(tmp_path, "a.csv", f"time [s],{heading}\n{rows}")], choices).campaign.runs
+    error = 1e-3 if choices.counts_per_turn else 1e-6
+    np.testing.assert_allclose(run.record.yaw_rad - run.record.yaw_rad[0], angle - angle[0], atol=2 * error)
+
+
 def test_what_does_not_overflow_is_not_touched() -> None:
     square = np.where(np.arange(2000) // 10 % 2, 300.0, 0.0)
     for reading in (3.0 * np.cos(np.arange(2000) / 40.0), square):
