@@ -154,6 +154,28 @@ def test_stamps_coarser_than_the_sampling_are_spread() -> None:
     assert np.abs(found.time_s - time).max() <= 0.02
 
 
+@pytest.mark.parametrize("start", [0.0, 0.6])
+@pytest.mark.parametrize("stamp", [0.1, 1.0])
+def test_the_rate_of_coarse_stamps_is_that_of_the_whole_ones(stamp: float, start: float) -> None:
+    """The first and the last second of a clock that shows seconds have fewer samples."""
+    time, angle = decay()
+    clock = np.floor((time + start * stamp) / stamp + 1e-9) * stamp
+    found = cleaned(clock, angle)
+    np.testing.assert_allclose(found.time_s, time, rtol=2e-3, atol=1e-9)
+
+
+@pytest.mark.parametrize("series", [2, 3])
+def test_series_whose_rows_alternate_are_not_one_reading(series: int) -> None:
+    time, angle = decay()
+    rate = np.gradient(angle, time)
+    both = np.stack([angle, rate, angle + 0.05][:series], axis=1).ravel()
+    with pytest.raises(TunnelError, match=f"every time has {series} rows") as refused:
+        cleaned(np.repeat(time, series), both)
+    assert "a column or a file of its own" in refused.value.remedy
+    noisy = angle + 0.02 * np.random.default_rng(1).standard_normal(angle.size)
+    assert cleaned(np.repeat(time[::series], series)[: time.size], noisy).time_s.size == time.size
+
+
 def test_uneven_stamps_are_kept_and_said() -> None:
     time, angle = decay()
     uneven = cleaned(time + 4e-4 * np.sin(np.arange(time.size)), angle)
@@ -281,6 +303,17 @@ def test_rows_of_one_run_are_sorted_however_mixed_up() -> None:
     found = cleaned(time[shuffled], angle[shuffled])
     np.testing.assert_array_equal(found.reading, angle)
     assert "sorted" in "; ".join(found.remarks)
+
+
+def test_rows_from_the_last_to_the_first_are_one_record() -> None:
+    time, angle = decay()
+    uneven = time + 1e-3 * np.random.default_rng(1).random(time.size)
+    found = cleaned(uneven[::-1], angle[::-1])
+    np.testing.assert_array_equal(found.reading, angle)
+    np.testing.assert_allclose(found.time_s, uneven - uneven[0], atol=1e-8)
+    coarse = cleaned(np.floor(time[::-1] * 50.0) / 50.0, angle[::-1])
+    np.testing.assert_array_equal(coarse.reading, angle)
+    assert np.abs(coarse.time_s - time).max() <= 0.02
 
 
 def test_coarse_stamps_are_not_spread_across_a_gap() -> None:
