@@ -143,6 +143,7 @@ def in_seconds(
             raise asking("--time NAME", "no column of times", where, ", or --rate in Hz")
         why = f"times at {1.0 / interval:.6g} Hz: {origin}"
         return RunColumn(NO_CHANNEL, np.arange(count, dtype=np.float64) * interval, "s", "time", (why,))
+    _refuse_unread(times, where)
     values, remarks = without_overflow(times.values)
     unit = stated_unit(choices.time_unit, ("time",), "--time-unit") or times.unit
     if unit and kind_of(unit) != "time":
@@ -156,6 +157,14 @@ def in_seconds(
         remarks.append(doubt(f"{taken}; --time-unit changes this"))
     values = values * UNITS["time"][unit] if unit != "s" else values
     return RunColumn(times, values, unit, "time", tuple(remarks))
+
+
+def _refuse_unread(channel: Channel, where: str) -> None:
+    """Refuse a column with a part of its numbers in an unknown form: the rest is not the record."""
+    if channel.unread:
+        what = f"{channel.quoted} has numbers such as '{one_line(channel.unread, 20)}', in an unknown form"
+        remedy = "write them without brackets, units and separators of thousands, or state --decimal"
+        raise TunnelError(what, where=where, remedy=remedy)
 
 
 def _ask_for_unit(channel: Channel, kinds: Sequence[str], option: str, where: str) -> None:
@@ -197,6 +206,7 @@ def in_radians(
     Args:
         timed: the readings of the column, NaN where there is no time.
     """
+    _refuse_unread(reading, where)
     linear = linear_unit(choices.unit or reading.unit or column_unit(reading.name))
     if linear is not None and choices.counts_per_turn is None and calibration is None:
         of, unit, factor = linear

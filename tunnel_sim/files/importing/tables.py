@@ -40,12 +40,15 @@ class Channel:
         values: values in the unit of the file; NaN for a missing number.
         unit: one of `units.UNITS`, another text, or empty if none is stated.
         place: number of the column in the file, from 1 on; 0 if the file does not number its columns.
+        unread: one of its numbers in an unknown form, where so many are that it lacks a part of its record;
+            empty if there is none.
     """
 
     name: str
     values: Rows
     unit: str = ""
     place: int = 0
+    unread: str = ""
 
     def __post_init__(self) -> None:
         """Make every NaN quiet: a damaged file may contain signalling ones, which turn a minimum into NaN.

@@ -27,6 +27,11 @@ _NUMBER = {
     ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"),
     ",": re.compile(r"[+-]?(\d+(,\d+)?|,\d+)([eE][+-]?\d+)?"),
 }
+_GROUPED = {
+    ".": re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+(\.\d+)?"),
+    ",": re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3})+(,\d+)?"),
+}
+"""Numbers with separators of thousands: they show the decimal sign of a file, and are not read."""
 _FACT = re.compile(
     r"(?:^|[,;|\t])\W*([^\W\d_](?:[^\d:=,;\t]|(?<=[^\W_])\d|(?<=\^)-?\d)*?)\s*[:=,;\t]\s*"
     r"(?:([^\s\d:=,;\t|][^:=,;\t|]{0,14}?)\s*[;,\t]\s*)?([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)"
@@ -214,7 +219,11 @@ TEXT = Reader("a table of text", limits.CSV_BYTES)
 _CLOCK = r"(?:^|[ T])(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?)(?:\s*([AaPp])\.?[Mm]\.?|Z|[+-]\d{2}:?\d{2})?$"
 _DAY = 86400.0  # s
 _HEAD, _MIDDLE = 2**18, 2**14  # number of inspected bytes
+_MINUS = re.compile("(?:\N{MINUS SIGN}|\N{EN DASH})(?=[0-9.,])".encode())
+"""A minus that programs write as in print."""
 _LOOKED_AT = 1000  # number of texts of a column that show whether they are times of day
+_LIKE_A_NUMBER = r"^\W{0,3}\d"
+_FEW_UNREAD = 0.05  # share of a column: damaged lines of a serial log are fewer
 _PART = 2**20  # number of texts converted at once
 _LONG_LINE = 1000  # characters: a longer line above a table does not state a number
 _HEAD_LINES = 400
@@ -233,10 +242,10 @@ class Dialect:
     def split(self, line: str) -> list[str]:
         """The cells of a line, without blanks and quotes around them."""
         if self.delimiter == " ":
-            return line.split()
-        cells = re.findall(
-            rf'(?:^|{re.escape(self.delimiter)})("[^"]*"|[^{re.escape(self.delimiter)}]*)', line
-        )
+            cells = re.findall(r'"[^"]*"(?!\S)|\S+', line)
+        else:
+            sign = re.escape(self.delimiter)
+            cells = re.findall(rf'(?:^|{sign})([ \t]*"[^"]*"[ \t]*(?={sign}|$)|[^{sign}]*)', line)
         return [cell.strip(' \t"') for cell in cells]
 
 
@@ -251,6 +260,8 @@ def read_text_tables(
         "give the file the ending of its format (.xlsx, .mat, .tdms, .h5, .parquet), or save it again as text"
     )
     check_lines(content, where, nul)
+    if not content.isascii():
+        content = _MINUS.sub(b"-", content)
     head = content[:_HEAD].decode(errors="replace").splitlines()
     if len(content) > _HEAD:
         head.pop()
@@ -370,7 +381,8 @@ def find_dialect(body: Sequence[str], choices: ImportChoices) -> Dialect | None:
             rows = [Dialect(delimiter, decimal, 0).split(line) for line in body]
             width = Counter(len(row) for row in rows).most_common(1)[0][0] if rows else 0
             cells = [cell for row in rows for cell in row if not is_missing(cell)]
-            share = sum(is_number(cell, decimal) for cell in cells) / max(len(cells), 1)
+            grouped = _GROUPED[decimal].fullmatch
+            share = sum(is_number(c, decimal) or grouped(c) is not None for c in cells) / max(len(cells), 1)
             if (round(share, 1), width) > score:
                 best, score = Dialect(delimiter, decimal, width), (round(share, 1), width)
     return best
@@ -405,7 +417,7 @@ def tables_of(
     ):
         if i in layout.beside:
             continue
-        number, lost = column, 0
+        number, lost, unread = column, 0, ""
         if column.dtype == pl.String and name == "drive_hold":
             number = column.map_elements(hold_order, return_dtype=pl.Float64).fill_nan(None)
             lost = number.null_count() - column.null_count()
@@ -422,14 +434,22 @@ def tables_of(
                 notes[i] = f"the column '{name}' holds times of day, taken as seconds"
         elif lost:
             notes[i] = f"{counted(lost, 'text')} in the column '{name}' taken as missing"
+            unread = _unread(column, number)
         if number.null_count() < number.len():
-            channels.append(Channel(name, number.fill_null(float("nan")).to_numpy(), unit, i + 1))
+            channels.append(Channel(name, number.fill_null(float("nan")).to_numpy(), unit, i + 1, unread))
     table = replace(table, channels=tuple(channels), headed=layout.headed)
     tables = [table]
     if labels is not None and layout.runs is not None and labels.len() == frame.height:
         tables = by_texts(table, layout.names[layout.runs], labels)
     said = tuple(note for i, note in notes.items() if not (tables[0].named and i == layout.runs))
     return [replace(one, remarks=(*said, *one.remarks[1:])) for one in tables]
+
+
+def _unread(column: pl.Series, number: pl.Series) -> str:
+    """One of the texts that are numbers in an unknown form, such as ``(0.35)`` or ``1'204``; empty if few are."""
+    texts = column.filter(number.is_null() & column.is_not_null()).str.strip_chars(' \t\r"')
+    numbers = texts.filter(texts.str.contains(_LIKE_A_NUMBER) & ~texts.str.contains("#", literal=True))
+    return str(numbers[0]) if numbers.len() > _FEW_UNREAD * column.len() else ""
 
 
 def _in_parts(column: pl.Series, convert: Callable[[pl.Series], pl.Series]) -> pl.Series:

@@ -44,6 +44,7 @@ def test_a_dialect_is_understood(seed: int, tmp_path: Path) -> None:
         (["0.5", "0.6"], "\t", ".", 1),
         (["10:00:01;0,5;ok", "10:00:02;0,25;ok"], ";", ",", 3),
         (["1e-3|-2E+1", ".5|5."], "|", ".", 2),
+        (["1.204;0,5", "1.205,5;0,4"], ";", ",", 2),
     ],
 )
 def test_the_dialect_of_some_lines(lines: list[str], delimiter: str, decimal: str, width: int) -> None:
@@ -192,6 +193,33 @@ def test_bad_input_says_what_to_give(tmp_path: Path, content: bytes, what: str, 
     assert what in caught.value.what
     assert remedy in caught.value.remedy
     assert "bad.csv" in caught.value.where
+
+
+@pytest.mark.parametrize("minus", ["\N{MINUS SIGN}", "\N{EN DASH}"])
+def test_a_minus_as_in_print_is_one(minus: str, tmp_path: Path) -> None:
+    _, angle = decay()
+    path = csv(tmp_path)
+    path.write_text(path.read_text("ascii").replace("-", minus), encoding="utf-8")
+    (run,) = read_records([path]).campaign.runs
+    np.testing.assert_allclose(run.record.yaw_rad, angle, atol=1e-6)
+
+
+@pytest.mark.parametrize("form", ["({:.6f})", "{:.6f}-", "-1'{:.6f}", "-1 {:.6f}", "-{:.6f} rad"])
+def test_half_a_column_of_unknown_numbers_is_refused(form: str, tmp_path: Path) -> None:
+    """The other half has the frequency and the damping of the whole one."""
+    time, angle = decay()
+    cells = [form.format(-y) if y < 0.0 else f"{y:.6f}" for y in angle]
+    text = "t [s];yaw [rad]\n" + "".join(f"{t:.3f};{cell}\n" for t, cell in zip(time, cells, strict=True))
+    with pytest.raises(TunnelError, match="'yaw' has numbers such as .*, in an unknown form"):
+        read_records([written(tmp_path, "log.csv", text)])
+
+
+def test_a_quote_ends_a_cell_only_before_a_delimiter() -> None:
+    lines = [f'"{i}" 0.0{i} 0.3{i}' for i in range(9)]
+    found = find_dialect(lines, ImportChoices())
+    assert found is not None
+    assert (found.delimiter, found.width) == (" ", 3)
+    assert found.split(lines[1]) == ["1", "0.01", "0.31"]
 
 
 def test_an_unknown_column_has_a_suggestion(tmp_path: Path) -> None:
