@@ -14,6 +14,16 @@ import polars as pl
 
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.condition_names import mentions_wind
+from tunnel_sim.files.importing.formats.cells import (
+    MISSING,
+    as_numbers,
+    is_missing,
+    is_number,
+    like_number,
+    seconds_of_day,
+    unread_in,
+    without_thousands,
+)
 from tunnel_sim.files.importing.tables import Channel, Table, by_texts, hold_order, names_runs
 from tunnel_sim.files.importing.units import UNITS, kind_of, known_unit, split_unit, unit_beside
 from tunnel_sim.files.readers import Reader
@@ -21,17 +31,6 @@ from tunnel_sim.files.reading import check_count, check_lines, check_utf8, read_
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, counted, one_line, shown
 
-MISSING = ("", "nan", "-nan", "#n/a", "n/a", "na", "null", "none", "-", "--", "inf", "-inf", "#num!")
-"""Texts, in lower case, that stand for a missing number."""
-_NUMBER = {
-    ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"),
-    ",": re.compile(r"[+-]?(\d+(,\d+)?|,\d+)([eE][+-]?\d+)?"),
-}
-_GROUPED = {
-    ".": re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+(\.\d+)?"),
-    ",": re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3})+(,\d+)?"),
-}
-"""Numbers with separators of thousands: they show the decimal sign of a file, and are not read."""
 _FACT = re.compile(
     r"(?:^|[,;|\t])\W*([^\W\d_](?:[^\d:=,;\t]|(?<=[^\W_])\d|(?<=\^)-?\d)*?)\s*[:=,;\t]\s*"
     r"(?:([^\s\d:=,;\t|][^:=,;\t|]{0,14}?)\s*[;,\t]\s*)?([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)"
@@ -43,16 +42,6 @@ _SI = {kind: next(unit for unit, factor in units.items() if factor == 1.0) for k
 _AXIS = re.compile(r"(?i)\W*(horizontal|vertical) units?\s*[,:;=\t]\s*(.+)$")
 _COUNTS = ("sequence", "points")  # beside units: the column counts samples
 _LONG_UNIT = 8  # characters: a longer text is a name
-
-
-def is_number(text: str, decimal: str = ".") -> bool:
-    """Whether a text is a number."""
-    return _NUMBER[decimal].fullmatch(text) is not None
-
-
-def is_missing(text: str) -> bool:
-    """Whether a text stands for a missing number."""
-    return text.lower() in MISSING
 
 
 @dataclass(frozen=True)
@@ -104,16 +93,28 @@ def find_layout(
 ) -> Layout | None:
     """Names, units and the first row of numbers of a sheet, given the cells and lines of its head; or None."""
     tail = [row for row in rows[len(rows) // 2 :] if any(cell for cell in row)]
+    # a column with both signs has no separators of thousands
+    other = "." if decimal == "," else ","
+    pointed = {
+        i
+        for row in rows
+        for i, cell in enumerate(row)
+        if is_number(cell, other) and not like_number(cell, decimal)
+    }
+
+    def is_read(cell: str, column: int) -> bool:
+        return is_number(cell, decimal) or (column not in pointed and like_number(cell, decimal))
+
     numeric = [
         column
         for column in range(width)
-        if 2 * sum(column < len(row) and is_number(row[column], decimal) for row in tail) > len(tail)
+        if 2 * sum(column < len(row) and is_read(row[column], column) for row in tail) > len(tail)
     ]
 
     def is_data(row: Sequence[str]) -> bool:
-        cells = [row[column] if column < len(row) else "" for column in numeric]
-        filled = sum(is_number(cell, decimal) for cell in cells)
-        return filled > 0 and all(is_number(cell, decimal) or is_missing(cell) for cell in cells)
+        cells = [(row[column] if column < len(row) else "", column) for column in numeric]
+        filled = sum(is_read(*cell) for cell in cells)
+        return filled > 0 and all(is_read(*cell) or is_missing(cell[0]) for cell in cells)
 
     first = next((i for i in range(len(rows)) if all(map(is_data, rows[i : i + 3]))), None)
     if first is None:
@@ -216,14 +217,11 @@ def distinct(names: Sequence[str]) -> list[str]:
 
 TEXT = Reader("a table of text", limits.CSV_BYTES)
 """Any file without a reader of its own; `read_text_tables` takes known properties of its dialect."""
-_CLOCK = r"(?:^|[ T])(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?)(?:\s*([AaPp])\.?[Mm]\.?|Z|[+-]\d{2}:?\d{2})?$"
 _DAY = 86400.0  # s
 _HEAD, _MIDDLE = 2**18, 2**14  # number of inspected bytes
 _MINUS = re.compile("(?:\N{MINUS SIGN}|\N{EN DASH})(?=[0-9.,])".encode())
 """A minus that programs write as in print."""
 _LOOKED_AT = 1000  # number of texts of a column that show whether they are times of day
-_LIKE_A_NUMBER = r"^\W{0,3}\d"
-_FEW_UNREAD = 0.05  # share of a column: damaged lines of a serial log are fewer
 _PART = 2**20  # number of texts converted at once
 _LONG_LINE = 1000  # characters: a longer line above a table does not state a number
 _HEAD_LINES = 400
@@ -339,7 +337,9 @@ def frame_of(
     try:
         if at is not None:
             return pl.read_csv(content, schema=all_texts, columns=[at], **options)
-        kinds = {name: pl.String if i in texts else pl.Float64 for i, name in enumerate(names)}
+        # where commas are decimal, points may separate thousands: each column shows whether they do
+        exact = dialect.decimal == "," and _has_points(content, layout.first)
+        kinds = {name: pl.String if exact or i in texts else pl.Float64 for i, name in enumerate(names)}
         numbers = {**options, "decimal_comma": dialect.decimal == ","}
         if not set(texts) - {layout.runs}:  # a text may contain delimiters in quotes
             numbers["quote_char"] = None
@@ -350,6 +350,14 @@ def frame_of(
     except pl.exceptions.PolarsError as error:
         what = f"not a table of text ({one_line(error, 60)})"
         raise TunnelError(what, where=where, remedy="give every line one value for each column") from None
+
+
+def _has_points(content: bytes, first: int) -> bool:
+    """Whether a table has a point in a row of numbers, the first of which is given."""
+    start = 0
+    for _ in range(first):
+        start = content.find(b"\n", start) + 1
+    return content.find(b".", start) >= 0
 
 
 def _cells(line: str, dialect: Dialect) -> list[str]:
@@ -381,8 +389,7 @@ def find_dialect(body: Sequence[str], choices: ImportChoices) -> Dialect | None:
             rows = [Dialect(delimiter, decimal, 0).split(line) for line in body]
             width = Counter(len(row) for row in rows).most_common(1)[0][0] if rows else 0
             cells = [cell for row in rows for cell in row if not is_missing(cell)]
-            grouped = _GROUPED[decimal].fullmatch
-            share = sum(is_number(c, decimal) or grouped(c) is not None for c in cells) / max(len(cells), 1)
+            share = sum(like_number(cell, decimal) for cell in cells) / max(len(cells), 1)
             if (round(share, 1), width) > score:
                 best, score = Dialect(delimiter, decimal, width), (round(share, 1), width)
     return best
@@ -422,19 +429,20 @@ def tables_of(
             number = column.map_elements(hold_order, return_dtype=pl.Float64).fill_nan(None)
             lost = number.null_count() - column.null_count()
         elif column.dtype == pl.String:
-            number = _in_parts(column, partial(_as_numbers, decimal=decimal))
+            cells = without_thousands(column) if decimal == "," else column
+            number = _in_parts(cells, partial(as_numbers, decimal=decimal))
             lost = number.null_count() - column.null_count()
         if lost and number.null_count() == column.len():
             notes[i] = f"the column '{name}' holds text and is left out"
-            some = _seconds(column.drop_nulls().head(_LOOKED_AT))
+            some = seconds_of_day(column.drop_nulls().head(_LOOKED_AT))
             if 2 * some.null_count() <= some.len():
-                seconds = _in_parts(column, _seconds)
+                seconds = _in_parts(column, seconds_of_day)
                 midnights = (seconds.forward_fill().diff() < -_DAY / 2).fill_null(value=False).cum_sum()
                 number, unit = seconds + _DAY * midnights, "s"
                 notes[i] = f"the column '{name}' holds times of day, taken as seconds"
         elif lost:
             notes[i] = f"{counted(lost, 'text')} in the column '{name}' taken as missing"
-            unread = _unread(column, number)
+            unread = unread_in(column, number)
         if number.null_count() < number.len():
             channels.append(Channel(name, number.fill_null(float("nan")).to_numpy(), unit, i + 1, unread))
     table = replace(table, channels=tuple(channels), headed=layout.headed)
@@ -445,34 +453,10 @@ def tables_of(
     return [replace(one, remarks=(*said, *one.remarks[1:])) for one in tables]
 
 
-def _unread(column: pl.Series, number: pl.Series) -> str:
-    """One of the texts that are numbers in an unknown form, such as ``(0.35)`` or ``1'204``; empty if few are."""
-    texts = column.filter(number.is_null() & column.is_not_null()).str.strip_chars(' \t\r"')
-    numbers = texts.filter(texts.str.contains(_LIKE_A_NUMBER) & ~texts.str.contains("#", literal=True))
-    return str(numbers[0]) if numbers.len() > _FEW_UNREAD * column.len() else ""
-
-
 def _in_parts(column: pl.Series, convert: Callable[[pl.Series], pl.Series]) -> pl.Series:
     """Numbers of a column of texts, part by part: a conversion temporarily takes ten times the memory."""
     parts = [convert(column.slice(start, _PART)) for start in range(0, max(column.len(), 1), _PART)]
     return pl.concat(parts)
-
-
-def _as_numbers(column: pl.Series, decimal: str) -> pl.Series:
-    cells = column.str.strip_chars(' \t\r"')
-    cells = cells.str.replace(",", ".", literal=True) if decimal == "," else cells
-    return cells.cast(pl.Float64, strict=False)
-
-
-def _seconds(column: pl.Series) -> pl.Series:
-    """Times of day such as 14:03:07.25, with or without a date, in s since midnight; null if there is none."""
-    text = column.str.strip_chars(' \t\r"')
-    parts = (text.str.extract(_CLOCK, group).str.replace(",", ".") for group in (1, 2, 3))
-    hours, minutes, rest = (part.cast(pl.Float64) for part in parts)
-    half = text.str.extract(_CLOCK, 4).str.to_lowercase()  # the twelfth hour is the first of its half day
-    hours = pl.select(pl.when(half.is_null()).then(hours).otherwise(hours % 12.0)).to_series()
-    hours += (half == "p").fill_null(value=False).cast(pl.Float64) * 12.0
-    return 3600.0 * hours + 60.0 * minutes + rest
 
 
 def read_cells(path: Path) -> tuple[list[str], list[list[str]]]:

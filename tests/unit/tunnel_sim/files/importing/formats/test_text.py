@@ -210,8 +210,23 @@ def test_half_a_column_of_unknown_numbers_is_refused(form: str, tmp_path: Path) 
     time, angle = decay()
     cells = [form.format(-y) if y < 0.0 else f"{y:.6f}" for y in angle]
     text = "t [s];yaw [rad]\n" + "".join(f"{t:.3f};{cell}\n" for t, cell in zip(time, cells, strict=True))
-    with pytest.raises(TunnelError, match="'yaw' has numbers such as .*, in an unknown form"):
+    with pytest.raises(TunnelError, match=r"'yaw' has numbers such as .*, in an unknown form"):
         read_records([written(tmp_path, "log.csv", text)])
+
+
+def test_a_point_between_thousands_is_no_decimal_point(tmp_path: Path) -> None:
+    """Such a clock, in whole milliseconds, would start anew at each thousand, or lose its first rows."""
+    time, angle = decay(duration=2.5)
+    cells = [f"{y:.6f}".replace(".", ",") for y in angle]
+    clock = [f"{1e3 * t - 1900.0:,.0f}".replace(",", ".") for t in time]
+    rows = [f"{t};{cell}" for t, cell in zip(clock, cells, strict=True)]
+    with pytest.raises(TunnelError, match=r"'Zeit' has numbers such as '-1\.900', in an unknown form"):
+        read_records([written(tmp_path, "log.csv", "\n".join(["Zeit [ms];Winkel [rad]", *rows]))])
+    rows = [f"{t + 0.5:.3f};{cell};1,5" for t, cell in zip(time, cells, strict=True)]
+    path = written(tmp_path, "log.csv", "\n".join(["t [s];yaw [rad];p", *rows]))
+    (run,) = read_records([path]).campaign.runs
+    np.testing.assert_allclose(run.record.time_s, time, atol=1e-9)
+    np.testing.assert_allclose(run.record.yaw_rad, angle, atol=1e-6)
 
 
 def test_a_quote_ends_a_cell_only_before_a_delimiter() -> None:
