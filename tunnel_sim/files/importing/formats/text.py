@@ -70,7 +70,8 @@ def facts_in(lines: Sequence[str]) -> dict[str, float]:
     """Numbers stated in lines, such as ``Sample rate: 1000 Hz`` or ``V = 54 km/h``, by name and unit.
 
     Returns:
-        Values in SI units if the unit is known; the name then ends with it in brackets.
+        Values in SI units if the unit is known; the name then ends with it in brackets. NaN for a name with
+        several numbers: which of them belongs to a run is not known.
     """
     facts = {}
     for line in (line.replace('"', "") for line in lines if len(line) <= _LONG_LINE):
@@ -84,7 +85,8 @@ def facts_in(lines: Sequence[str]) -> dict[str, float]:
                 text, value = _SI[kind_of(unit)], value * UNITS[kind_of(unit)][unit]
             elif text.lower() in _HERTZ:
                 text, value = "", value * _HERTZ[text.lower()]
-            facts[f"{name} ({text})" if text else name] = value
+            heading = f"{name} ({text})" if text else name
+            facts[heading] = value if facts.get(heading, value) == value else float("nan")
     return facts
 
 
