@@ -15,6 +15,7 @@ from tunnel_sim.files.importing.remarks import doubt
 from tunnel_sim.files.importing.source import read_source
 from tunnel_sim.files.importing.tables import NO_CHANNEL, Channel, RunColumn
 from tunnel_sim.files.importing.units import UNITS, kind_of, known_unit, written_unit
+from tunnel_sim.files.plausible import standing_for_missing
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import Quantity
 from tunnel_sim.vocabulary.errors import TunnelError, asking, counted, one_line, shown
@@ -27,6 +28,7 @@ _NEAR_END = 4.0  # multiple of the other steps: a jump leads from one end of the
 _MOST_JUMPS = 10  # minimum number of samples per jump
 _NEARLY = 0.75  # share of a counter's range: a step this long between two samples is an overflow
 _SMALL = 0.25  # share of the range: no other step is longer
+_MOST_CODES = 3  # number of different codes for missing readings, such as one for each end of a range
 _SLOWEST_STEP = 0.5  # s: a longer step between samples is in milliseconds, or in microseconds
 _HALF_TURN = pi  # half the span of an angle in radians: a greater span is in degrees
 _LONGEST_FORMULA = 200  # characters
@@ -129,8 +131,33 @@ def guessed_time_unit(values: Rows) -> tuple[str, float]:
 
 def guessed_angle_unit(values: Rows) -> tuple[str, float]:
     """The assumed unit of angles without one, and half their range in it."""
-    swing = 0.5 * float(np.nanmax(values) - np.nanmin(values))
+    swing = _swing(values)
     return "deg" if swing > _HALF_TURN else "rad", swing
+
+
+def _swing(values: Rows) -> float:
+    """Half the range of readings, without a single one far from all others."""
+    known = values[np.isfinite(values)]
+    standing = standing_for_missing(known) if known.size else None
+    return 0.5 * float(np.ptp(known if standing is None else known[~standing]))
+
+
+def without_codes(values: Rows) -> tuple[Rows, list[str]]:
+    """Readings without a number that stands for a missing one, such as -9999, and remarks.
+
+    A single reading far from all others may be one of the sensor, and is kept.
+    """
+    remarks = []
+    for _ in range(_MOST_CODES):
+        known = np.flatnonzero(np.isfinite(values))
+        standing = standing_for_missing(values[known]) if known.size else None
+        if standing is None or standing.sum() < 2:
+            break
+        code = float(values[known[standing][0]])
+        remarks.append(f"{int(standing.sum())} readings of {code:.6g}, far from all others, taken as missing")
+        values = values.copy()
+        values[known[standing]] = np.nan
+    return values, remarks
 
 
 def in_seconds(
@@ -210,8 +237,9 @@ def in_radians(
     linear = linear_unit(choices.unit or reading.unit or column_unit(reading.name))
     if linear is not None and choices.counts_per_turn is None and calibration is None:
         of, unit, factor = linear
-        values = timed if factor == 1.0 else factor * timed
-        return RunColumn(reading, values, unit, of, motion=DISPLACEMENT.motion)
+        values, codes = without_codes(timed)
+        values = values if factor == 1.0 else factor * values
+        return RunColumn(reading, values, unit, of, tuple(codes), motion=DISPLACEMENT.motion)
     kinds = ("angle", "counts", "voltage", "rate", "acceleration")
     unit = stated_unit(choices.unit, kinds, "--unit") or reading.unit
     if unit and kind_of(unit) not in kinds and choices.counts_per_turn is None and calibration is None:
@@ -220,7 +248,12 @@ def in_radians(
             where=where,
             remedy=f"give --unit ({', '.join(UNITS['angle'])} or another), --counts-per-turn N or --calibration",
         )
-    values, remarks = without_overflow(timed, choices.counts_per_turn or _turn_in(unit))
+    turn = choices.counts_per_turn or _turn_in(unit)
+    values, remarks = without_overflow(timed, turn)
+    if not remarks:  # the other end of a counter's range may also be far from all other readings
+        values, codes = without_codes(values)
+        values, overflowed = without_overflow(values, turn)
+        remarks = [*codes, *overflowed]
     if not np.isfinite(values).any():
         what = f"{reading.quoted} holds no number where the file states a time"
         raise TunnelError(what, where=where, remedy="leave the file out, or name another column by --angle")
@@ -268,7 +301,7 @@ def in_radians(
     factor = UNITS[kind][unit]
     quantity: Quantity = "rate" if kind == "rate" else "acceleration" if kind == "acceleration" else "angle"
     values = values if factor == 1.0 else values * factor
-    swing = 0.5 * float(np.nanmax(values) - np.nanmin(values))
+    swing = _swing(values)
     # a disc between springs swings as far, but counts look like degrees
     if unit == "deg" and choices.unit is None and calibration is None and swing > _HALF_TURN:
         what = f"{reading.quoted} would swing by more than half a turn in degrees"

@@ -73,7 +73,7 @@ def facts_in(lines: Sequence[str]) -> dict[str, float]:
         Values in SI units if the unit is known; the name then ends with it in brackets. NaN for a name with
         several numbers: which of them belongs to a run is not known.
     """
-    facts = {}
+    facts: dict[str, float] = {}
     for line in (line.replace('"', "") for line in lines if len(line) <= _LONG_LINE):
         for name, before, number, behind in _FACT.findall(line):
             name = name.strip()

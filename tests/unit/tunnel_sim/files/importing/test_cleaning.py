@@ -14,7 +14,7 @@ import pytest
 from tests.support.import_files import RATE, decay, written
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.cleaning import cleaned, clipped, from_zero, resolution, restarts
-from tunnel_sim.files.importing.column_numbers import without_overflow
+from tunnel_sim.files.importing.column_numbers import guessed_angle_unit, without_codes, without_overflow
 from tunnel_sim.files.importing.records import read_records
 from tunnel_sim.files.importing.releases import RecordPiece, find_runs, find_runs_of_rate
 from tunnel_sim.files.importing.tables import Channel
@@ -227,6 +227,32 @@ def test_a_turn_has_the_length_that_it_has_in_its_unit(
     (run,) = read_records([written(tmp_path, "a.csv", f"time [s],{heading}\n{rows}")], choices).campaign.runs
     error = 1e-3 if choices.counts_per_turn else 1e-6
     np.testing.assert_allclose(run.record.yaw_rad - run.record.yaw_rad[0], angle - angle[0], atol=2 * error)
+
+
+@pytest.mark.parametrize("heading", ["yaw", "yaw [rad]", "x [mm]", "encoder [counts]"])
+def test_a_code_for_a_missing_reading_is_none(heading: str, tmp_path: Path) -> None:
+    time, angle = decay()
+    values = np.round(angle * 4096.0 / (2.0 * np.pi)) if "counts" in heading else angle
+    values[50::97], values[60::97] = -9999.0, 9.91e37
+    rows = "".join(f"{t:.3f},{y:.8g}\n" for t, y in zip(time, values, strict=True))
+    path = written(tmp_path, "a.csv", f"time [s],{heading}\n{rows}")
+    counts = 4096.0 if "counts" in heading else None
+    imported = read_records([path], ImportChoices(counts_per_turn=counts))
+    (run,) = imported.campaign.runs
+    assert np.abs(run.record.yaw_rad).max() < 0.4
+    assert run.record.time_s.size == time.size - values[50::97].size - values[60::97].size
+    said = "; ".join(imported.remarks())
+    assert "readings of -9999, far from all others, taken as missing" in said
+    assert "readings of 9.91e+37, far from" in said
+
+
+def test_one_reading_far_from_all_others_does_not_change_the_unit() -> None:
+    _, angle = decay()
+    angle[700] = 8.2
+    assert guessed_angle_unit(angle)[0] == "rad"
+    found, said = without_codes(angle)
+    assert found is angle
+    assert said == []
 
 
 def test_what_does_not_overflow_is_not_touched() -> None:
