@@ -29,7 +29,8 @@ _MOST_JUMPS = 10  # minimum number of samples per jump
 _NEARLY = 0.75  # share of a counter's range: a step this long between two samples is an overflow
 _SMALL = 0.25  # share of the range: no other step is longer
 _MOST_CODES = 3  # number of different codes for missing readings, such as one for each end of a range
-_SLOWEST_STEP = 0.5  # s: a longer step between samples is in milliseconds, or in microseconds
+_SLOWEST_STEP = 0.5  # s: a longer step between samples is in a smaller unit
+_IN_USE = (1e9, 2.5e9)  # s: times since 1970, of the years 2001 to 2049, show their unit
 _HALF_TURN = pi  # half the span of an angle in radians: a greater span is in degrees
 _LONGEST_FORMULA = 200  # characters
 _NUMBER = r"([+-]?\s*(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
@@ -48,8 +49,9 @@ _RATE_FACTS = re.compile(
     r"(?i)(^|[^a-z])(fs|sample[ _]?rate|sampling[ _]?(rate|frequency)|samplerate|rate[ _]*\(?hz)($|[^a-z])"
 )
 _STEP_FACTS = re.compile(
-    r"(?i)(^|[^a-z])(ts|dt|delta_?t|sample[ _]?(time|interval)|sampling[ _]?(time|interval))($|[^a-z])"
+    r"(?i)(^|[^a-z])(ts|dt|delta[ _]?t|sample[ _]?(time|interval)|sampling[ _]?(time|interval))($|[^a-z])"
 )
+_HERTZ = {"khz": 1e3, "mhz": 1e6}
 _OWN_STEP = re.compile(r"(?i)^(wf_increment|delta_x|(x[ _]?)?increment)( \(s\))?$")
 
 _STEPS = (1.0 / limits.FASTEST_RATE, 1.0 / limits.SLOWEST_RATE)  # s
@@ -117,16 +119,26 @@ def sample_interval(facts: Mapping[str, float], choices: ImportChoices) -> tuple
     for pattern, is_rate in ((_OWN_STEP, False), (_RATE_FACTS, True), (_STEP_FACTS, False)):
         least, most = (limits.SLOWEST_RATE, limits.FASTEST_RATE) if is_rate else _STEPS
         for name, value in facts.items():
-            if pattern.search(name) and least <= value <= most:
-                return 1.0 / value if is_rate else float(value), f"'{name}' = {value:g} in the file"
+            word = re.split(r"[\s_(\[]+", name.rstrip(")] "))[-1]
+            factor = (
+                _HERTZ.get(word.lower(), 1.0) if is_rate else UNITS["time"].get(known_unit(word) or "", 1.0)
+            )
+            if pattern.search(name) and least <= value * factor <= most:
+                interval = 1.0 / (value * factor) if is_rate else float(value * factor)
+                return interval, f"'{name}' = {value:g} in the file"
     return None, ""
 
 
 def guessed_time_unit(values: Rows) -> tuple[str, float]:
     """The assumed unit of times without one, and the usual step in it."""
-    steps = np.diff(np.sort(values[np.isfinite(values)]))  # rows may be out of order
+    known = np.sort(values[np.isfinite(values)])  # rows may be out of order
+    steps = np.diff(known)
     step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
-    return "s" if step <= _SLOWEST_STEP else "ms" if step <= 1e3 * _SLOWEST_STEP else "us", step
+    units = {unit: UNITS["time"][unit] for unit in ("s", "ms", "us", "ns")}
+    first = float(known[0]) if known.size else 0.0
+    since = (unit for unit, factor in units.items() if _IN_USE[0] <= first * factor <= _IN_USE[1])
+    of_step = (unit for unit, factor in units.items() if step * factor <= _SLOWEST_STEP)
+    return next(since, None) or next(of_step, "ns"), step
 
 
 def guessed_angle_unit(values: Rows) -> tuple[str, float]:

@@ -111,6 +111,14 @@ def test_the_rate_is_found_above_the_table(tmp_path: Path) -> None:
     assert run.record.sample_rate == pytest.approx(200.0)
 
 
+@pytest.mark.parametrize("head", ["dt_ms: 5", "Ts_us: 5000", "sample_rate_kHz: 0.2", "delta t = 5 ms"])
+def test_the_rate_above_the_table_has_a_unit(head: str, tmp_path: Path) -> None:
+    time, angle = decay()
+    rows = "".join(f"{y:.8f},1\n" for y in angle)
+    (run,) = read_records([written(tmp_path, "log.csv", f"{head}\nyaw [rad],x\n{rows}")]).campaign.runs
+    np.testing.assert_allclose(run.record.time_s, time, atol=1e-9)
+
+
 def test_a_rate_beside_the_angle_is_not_taken_for_it(tmp_path: Path) -> None:
     time, angle = decay()
     rate = np.gradient(angle, time)
