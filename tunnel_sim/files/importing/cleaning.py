@@ -55,7 +55,7 @@ class Cleaned:
         return self.time_s + self.first_s
 
 
-def restarts(time: Times) -> list[int]:
+def restarts(time: Times, reading: Readings) -> list[int]:
     """Indices at which the times restart because another run follows; empty: none.
 
     Rows without a time, such as a blank line or a repeated heading between two runs, do not hide a restart.
@@ -69,19 +69,20 @@ def restarts(time: Times) -> list[int]:
     parts = [clock[a:b] for a, b in itertools.pairwise(starts)]
     # another run begins near the time of the first start, and not slightly before the previous row
     early = all(part[0] - clock[0] <= 0.1 * np.ptp(parts[0]) for part in parts[1:])
-    if not early and not _interleaved(clock, starts):
+    if not early and not _interleaved(clock, reading[known], starts):
         return []
     return [int(place) for place in known[back]]
 
 
-def _interleaved(clock: Times, starts: Sequence[int]) -> bool:
+def _interleaved(clock: Times, reading: Readings, starts: Sequence[int]) -> bool:
     """Whether sorting would mix the rows of parts that are long enough for runs."""
     part = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
     long = np.isin(part, np.flatnonzero(np.diff(starts) >= LEAST_ROWS))
     order = np.argsort(clock[long], kind="stable")
     changes = np.count_nonzero(np.diff(part[long][order]))
-    shared = np.count_nonzero(np.diff(clock[long][order]) == 0.0)  # rows that two parts repeat
-    return bool(changes > len(starts) + 2 * shared)
+    readings = np.nan_to_num(reading[long][order])
+    same = (np.diff(clock[long][order]) == 0.0) & (np.diff(readings) == 0.0)
+    return bool(changes > len(starts) + 2 * np.count_nonzero(same))  # rows that two parts repeat
 
 
 def cleaned(time: Times, reading: Readings) -> Cleaned:

@@ -270,7 +270,7 @@ def test_a_clock_that_starts_anew_begins_another_run(tmp_path: Path) -> None:
     assert [run.id for run in runs] == ["two-1", "two-2"]
     np.testing.assert_allclose(runs[0].record.yaw_rad, angle, atol=1e-8)
     shuffled = np.random.default_rng(1).permutation(time)
-    assert restarts(shuffled) == []
+    assert restarts(shuffled, time) == []
 
 
 BETWEEN = {
@@ -313,7 +313,7 @@ def test_a_missing_row_within_a_run_leaves_one_run(tmp_path: Path, row: str) -> 
 def test_rows_of_several_runs_are_never_sorted_into_one() -> None:
     time, angle = decay()
     late = np.concatenate([time, time + 3.0])  # the second clock starts within the first run's times
-    assert restarts(late) == [time.size]
+    assert restarts(late, np.concatenate([angle, angle])) == [time.size]
     shuffled = np.random.default_rng(1).permutation(late.size)
     both = np.concatenate([angle, decay(2, amplitude=0.2)[1]])
     with pytest.raises(TunnelError, match="rows are out of order"):
@@ -321,6 +321,14 @@ def test_rows_of_several_runs_are_never_sorted_into_one() -> None:
     offset = np.concatenate([time, time + 0.5 / RATE])[shuffled]  # an even clock at twice the rate
     with pytest.raises(TunnelError, match="rows are out of order"):
         cleaned(offset, both[shuffled])
+
+
+def test_a_clock_that_is_set_back_ends_a_run_unless_it_repeats_rows() -> None:
+    time, angle = decay()
+    back = np.where(time < 4.0, time, np.round(time - 0.8, 9))  # onto stamps of the first part
+    assert restarts(back, angle) == [800]
+    again = np.concatenate([time[:800], time[640:]])
+    assert restarts(again, np.concatenate([angle[:800], angle[640:]])) == []
 
 
 def test_rows_of_one_run_are_sorted_however_mixed_up() -> None:
