@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from tunnel_sim.files.importing.choices import ImportChoices
-from tunnel_sim.files.importing.column_names import listed, named_kind, names_voltage
+from tunnel_sim.files.importing.column_names import ANGLE, listed, named_kind, names_voltage
 from tunnel_sim.files.importing.remarks import doubt
 from tunnel_sim.files.importing.source import read_source
 from tunnel_sim.files.importing.tables import NO_CHANNEL, Channel, RunColumn
@@ -93,6 +93,16 @@ def _turn_in(unit: str) -> float | None:
     """A whole turn in a unit of angles; None of another unit."""
     factor = UNITS["angle"].get(unit)
     return None if factor is None else 2.0 * pi / factor
+
+
+def _continuous(values: Rows, turn: float | None) -> tuple[Rows, list[str]]:
+    """Readings without the overflow of a sensor and without codes for missing ones, and remarks."""
+    values, remarks = without_overflow(values, turn)
+    if remarks:  # the other end of a counter's range may also be far from all other readings
+        return values, remarks
+    values, codes = without_codes(values)
+    values, remarks = without_overflow(values, turn)
+    return values, [*codes, *remarks]
 
 
 def stated_unit(text: str | None, kinds: Sequence[str], option: str) -> str | None:
@@ -237,6 +247,16 @@ def refuse_without_unit(channels: Sequence[Channel], where: str) -> None:
     raise asking(option, f"{listed(found)} {noun}", where, units)
 
 
+def _refuse_rate(reading: Channel, where: str) -> None:
+    """Refuse a column named as a rate or an acceleration with a unit of an angle."""
+    rate = "" if ANGLE.search(reading.name) else named_kind(reading.name)
+    if rate and kind_of(reading.unit) == "angle":
+        noun = "an acceleration" if rate == "acceleration" else "a rate"
+        what = f"{reading.quoted} is {noun} by its name, and in {reading.unit}, a unit of an angle"
+        remedy = f"give --unit, one of {', '.join(UNITS[rate])}, or {reading.unit} if it is an angle"
+        raise TunnelError(what, where=where, remedy=remedy)
+
+
 def in_radians(
     reading: Channel, timed: Rows, choices: ImportChoices, calibration: Calibration | None, where: str
 ) -> RunColumn:
@@ -260,12 +280,9 @@ def in_radians(
             where=where,
             remedy=f"give --unit ({', '.join(UNITS['angle'])} or another), --counts-per-turn N or --calibration",
         )
-    turn = choices.counts_per_turn or _turn_in(unit)
-    values, remarks = without_overflow(timed, turn)
-    if not remarks:  # the other end of a counter's range may also be far from all other readings
-        values, codes = without_codes(values)
-        values, overflowed = without_overflow(values, turn)
-        remarks = [*codes, *overflowed]
+    if choices.unit is None:
+        _refuse_rate(reading, where)
+    values, remarks = _continuous(timed, choices.counts_per_turn or _turn_in(unit))
     if not np.isfinite(values).any():
         what = f"{reading.quoted} holds no number where the file states a time"
         raise TunnelError(what, where=where, remedy="leave the file out, or name another column by --angle")

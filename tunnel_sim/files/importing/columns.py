@@ -313,7 +313,7 @@ def _readings(
             raise TunnelError(what, where=where, remedy=f"give --angle, one of {listed(measured)}")
         readings = own or _likeliest(others)[1]
     widest = {unit: max(_span(c) for c in readings if c.unit == unit) for unit in {c.unit for c in readings}}
-    still = [c for c in readings if _span(c) < _HARDLY * widest[c.unit]]
+    still = [c for c in readings if _span(c) < _HARDLY * widest[c.unit] and not _of_others(c, readings, time)]
     remarks = [f"'{stem(channel.name)}' is left out: it hardly moves" for channel in still]
     readings = [channel for channel in readings if channel not in still]
     while len(readings) > 1 and (rate := _a_rate(readings, time)) is not None:
@@ -373,6 +373,21 @@ def _span(channel: Channel) -> float:
     """Difference of the greatest and the least number."""
     numbers = channel.values[np.isfinite(channel.values)]
     return float(np.ptp(numbers)) if numbers.size else 0.0
+
+
+def _of_others(channel: Channel, channels: Sequence[Channel], time: Channel) -> bool:
+    """Whether a column without a unit is the motion of which another one is the rate or the acceleration."""
+    others = [c for c in channels if c is not channel and c.unit == "" and _span(c) > _span(channel)]
+    if channel.unit or time is NO_CHANNEL:
+        return False
+    for other in others:
+        values = np.stack([c.values[:_HEAD] for c in (channel, other)])
+        first, second = values[:, np.isfinite(values).all(axis=0)]
+        if first.size >= _LEAST_JUDGED and np.ptp(first) > 0.0 < np.ptp(second):
+            alike = (np.corrcoef(one, second)[0, 1] for one in (first, np.gradient(first)))
+            if max(map(abs, alike)) > _DERIVATIVE:
+                return True
+    return False
 
 
 def _a_rate(channels: Sequence[Channel], time: Channel) -> Channel | None:

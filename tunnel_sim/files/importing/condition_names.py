@@ -75,7 +75,8 @@ _UNKNOWN = {
 """Units of conditions that are not among `UNITS`."""
 _WINDY = re.compile(
     r"(?i)(?<![a-z])(wind|air|flow|free_?stream|tunnel|pitot|anemometer|prandtl|fan|blower|gebl[äa]se|str[öo]mung|"
-    r"luft|windkanal)(?![a-z])|(?<![a-z])(air|wind|flow|fan)_?(speed|spd|vel)|(?<![a-z])[uv]_?(inf|∞|mean|air|wind|"
+    r"luft|windkanal)(?![a-z])|(?<![a-z])(air|wind|flow|fan)_?(speed|spd|vel)|"
+    r"vitesse du vent|viento|vento|風速|风速|(?<![a-z])[uv]_?(inf|∞|mean|air|wind|"
     r"tunnel|ref|fs)(?![a-z])|(?<![a-z])(speed|velocity|geschwindigkeit)(?![a-z])"
 )
 """Words in a name that suggest a wind speed."""
@@ -135,7 +136,8 @@ def condition_of(name: str, unit: str, *, alone: bool = False) -> str | None:
 def resembles(name: str, unit: str) -> str | None:
     """The condition that a name without a unit, or a unit alone, suggests without stating it; None: none."""
     words = _JOINED.sub("_", name.strip())
-    if _DYNAMIC.search(words) and unit.lower() in _PRESSURES:
+    pressed = _DYNAMIC.search(words) or (unit and re.fullmatch(r"(?i)q(\s*\W.*)?", words))
+    if pressed and unit.lower() in _PRESSURES:
         return "wind_speed"
     if unit:
         found = next((key for key, kind in _KINDS.items() if kind == kind_of(unit) and kind != "angle"), None)

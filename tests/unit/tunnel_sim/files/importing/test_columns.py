@@ -101,6 +101,24 @@ def test_a_column_that_hardly_moves_beside_another_is_left_out(share: float, lef
             pairs(*columns)
 
 
+@pytest.mark.parametrize("cycles", [2.0, 20.0])
+def test_an_angle_beside_its_acceleration_is_not_still(cycles: float) -> None:
+    """Without units the sizes do not compare: at 2 Hz the acceleration is 158 times the angle."""
+    time, omega = np.arange(4000) / 1000.0, 2.0 * np.pi * cycles
+    swing = np.cos(omega * time)
+    columns = (
+        Channel("time", time, "s"),
+        Channel("theta", swing),
+        Channel("alpha", -(omega**2) * swing),
+    )
+    with pytest.raises(TunnelError, match="2 columns may be the angle: 'theta', 'alpha'"):
+        pairs(*columns)
+    rate = Channel("beta", -omega * np.sin(omega * time))
+    taken, said = pairs(*columns[:2], rate)
+    assert taken == [("", "time", "theta")]
+    assert "'beta' is left out: it is the rate of another column" in said
+
+
 def test_runs_that_share_their_times_are_named_by_their_marks() -> None:
     taken, _ = pairs(
         Channel("time", TIME, "s"), Channel("yaw Run #3", SWING, "rad"), Channel("yaw Run #7", -SWING, "rad")

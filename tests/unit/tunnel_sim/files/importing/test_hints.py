@@ -462,3 +462,9 @@ def test_a_speed_in_an_unknown_unit_is_not_wind_off(heading: str, tmp_path: Path
 def test_a_stiffness_in_an_unknown_unit_is_said(heading: str, tmp_path: Path) -> None:
     imported = read_records([with_column(tmp_path, heading, 142.67)])
     assert "its unit is not one of N m/rad" in "; ".join(imported.remarks())
+
+
+@pytest.mark.parametrize("heading", ["q [Pa]", "vitesse du vent", "風速", "velocità del vento"])
+def test_a_wind_under_other_names_is_not_wind_off(heading: str, tmp_path: Path) -> None:
+    with pytest.raises(TunnelError, match="wind-off is not assumed beside it"):
+        read_records([with_column(tmp_path, heading, 60.0)])
