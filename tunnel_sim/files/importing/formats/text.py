@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -17,14 +17,16 @@ from tunnel_sim.files.importing.condition_names import mentions_wind
 from tunnel_sim.files.importing.formats.cells import (
     MISSING,
     as_numbers,
+    in_parts,
     is_missing,
     is_number,
     like_number,
     seconds_of_day,
     unread_in,
+    without_short_tables,
     without_thousands,
 )
-from tunnel_sim.files.importing.tables import Channel, Table, by_texts, hold_order, names_runs
+from tunnel_sim.files.importing.tables import LEAST_ROWS, Channel, Table, by_texts, hold_order, names_runs
 from tunnel_sim.files.importing.units import UNITS, kind_of, known_unit, split_unit, unit_beside
 from tunnel_sim.files.readers import Reader
 from tunnel_sim.files.reading import check_count, check_lines, check_utf8, read_regular
@@ -118,9 +120,17 @@ def find_layout(
         filled = sum(is_read(*cell) for cell in cells)
         return filled > 0 and all(is_read(*cell) or is_missing(cell[0]) for cell in cells)
 
-    first = next((i for i in range(len(rows)) if all(map(is_data, rows[i : i + 3]))), None)
+    starts = [i for i in range(len(rows)) if all(map(is_data, rows[i : i + 3]))]
+    headings = [i for i, row in enumerate(rows) if len(row) > 1 and _is_heading(row, numeric, decimal)]
+    first = next(iter(starts), None)
     if first is None:
         return None
+    # a short table above the record has another heading below it
+    for heading in (i for i in headings if i > first):
+        following = next((i for i in starts if i > heading), None)
+        if following is None or sum(map(is_data, rows[first:heading])) >= LEAST_ROWS:
+            break
+        first = following
     above = []  # the rows that may name every column
     for index, row in enumerate(rows[:first]):
         cells = [cell.strip().strip('"').strip() for cell in row]
@@ -149,6 +159,12 @@ def find_layout(
         facts_in(stated) | numbers,
         beside,
     )
+
+
+def _is_heading(row: Sequence[str], numeric: Sequence[int], decimal: str) -> bool:
+    """Whether a row names every column of numbers."""
+    cells = [row[i].strip(' "') if i < len(row) else "" for i in numeric]
+    return len(set(cells)) > 1 and all(cell and not like_number(cell, decimal) for cell in cells)
 
 
 def _units_row(
@@ -224,7 +240,6 @@ _HEAD, _MIDDLE = 2**18, 2**14  # number of inspected bytes
 _MINUS = re.compile("(?:\N{MINUS SIGN}|\N{EN DASH})(?=[0-9.,])".encode())
 """A minus that programs write as in print."""
 _LOOKED_AT = 1000  # number of texts of a column that show whether they are times of day
-_PART = 2**20  # number of texts converted at once
 _LONG_LINE = 1000  # characters: a longer line above a table does not state a number
 _HEAD_LINES = 400
 _NAMES = {"tab": "\t", ";": ";", ",": ",", "|": "|", "blank": " "}
@@ -421,6 +436,7 @@ def tables_of(
 ) -> list[Table]:
     """The tables of a sheet with its columns of numbers or times of day: one, or one for each run of the labels."""
     channels, notes = [], {-1: table.remarks[0]}
+    frame, below = without_short_tables(frame, decimal)
     for i, (name, unit, column) in enumerate(
         zip(layout.names, layout.units, frame.get_columns(), strict=True)
     ):
@@ -432,13 +448,13 @@ def tables_of(
             lost = number.null_count() - column.null_count()
         elif column.dtype == pl.String:
             cells = without_thousands(column) if decimal == "," else column
-            number = _in_parts(cells, partial(as_numbers, decimal=decimal))
+            number = in_parts(cells, partial(as_numbers, decimal=decimal))
             lost = number.null_count() - column.null_count()
         if lost and number.null_count() == column.len():
             notes[i] = f"the column '{name}' holds text and is left out"
             some = seconds_of_day(column.drop_nulls().head(_LOOKED_AT))
             if 2 * some.null_count() <= some.len():
-                seconds = _in_parts(column, seconds_of_day)
+                seconds = in_parts(column, seconds_of_day)
                 midnights = (seconds.forward_fill().diff() < -_DAY / 2).fill_null(value=False).cum_sum()
                 number, unit = seconds + _DAY * midnights, "s"
                 notes[i] = f"the column '{name}' holds times of day, taken as seconds"
@@ -452,13 +468,7 @@ def tables_of(
     if labels is not None and layout.runs is not None and labels.len() == frame.height:
         tables = by_texts(table, layout.names[layout.runs], labels)
     said = tuple(note for i, note in notes.items() if not (tables[0].named and i == layout.runs))
-    return [replace(one, remarks=(*said, *one.remarks[1:])) for one in tables]
-
-
-def _in_parts(column: pl.Series, convert: Callable[[pl.Series], pl.Series]) -> pl.Series:
-    """Numbers of a column of texts, part by part: a conversion temporarily takes ten times the memory."""
-    parts = [convert(column.slice(start, _PART)) for start in range(0, max(column.len(), 1), _PART)]
-    return pl.concat(parts)
+    return [replace(one, remarks=(*said, *below, *one.remarks[1:])) for one in tables]
 
 
 def read_cells(path: Path) -> tuple[list[str], list[list[str]]]:

@@ -237,6 +237,24 @@ def test_a_point_between_thousands_is_no_decimal_point(tmp_path: Path) -> None:
     np.testing.assert_allclose(run.record.yaw_rad, angle, atol=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("above", "below"),
+    [
+        ("Voltage [V],Angle [deg]\n0,-180\n1,-108\n2,-36\n3,36\n\n", ""),
+        ("", "\nPeak,Amplitude\n" + "".join(f"{k},{0.35 * 0.9**k:.4f}\n" for k in range(1, 13))),
+        ("", "# mean\n4.0,0.0012\n# deviation\n4.0,0.145\n"),
+        ("Channel,Gain\n1,10\n2,20\n3,30\n", "\nStatistics,\nMax,0.35\nSamples,1600\n"),
+    ],
+)
+def test_a_short_table_beside_the_record_is_no_part_of_it(above: str, below: str, tmp_path: Path) -> None:
+    time, angle = decay()
+    rows = "".join(f"{t:.3f},{1e3 * y:.6f}\n" for t, y in zip(time, angle, strict=True))
+    path = written(tmp_path, "log.csv", f"{above}Time [s],Angle [mrad]\n{rows}{below}")
+    (run,) = read_records([path]).campaign.runs
+    np.testing.assert_allclose(run.record.time_s, time, atol=1e-9)
+    np.testing.assert_allclose(run.record.yaw_rad, angle, atol=1e-8)
+
+
 def test_a_quote_ends_a_cell_only_before_a_delimiter() -> None:
     lines = [f'"{i}" 0.0{i} 0.3{i}' for i in range(9)]
     found = find_dialect(lines, ImportChoices())
