@@ -39,7 +39,7 @@ from tunnel_sim.files.importing.inputs import (
 )
 from tunnel_sim.files.importing.remarks import doubt
 from tunnel_sim.files.importing.tables import NO_CHANNEL, Channel, RunColumn, Table, is_input
-from tunnel_sim.files.importing.units import claims, kind_of
+from tunnel_sim.files.importing.units import UNITS, claims, kind_of
 from tunnel_sim.vocabulary.errors import TunnelError, asking, attempt, did_you_mean, joined, one_line
 from tunnel_sim.vocabulary.freedom import DISPLACEMENT, FREEDOMS, column_unit, freedom_of_column, linear_unit
 from tunnel_sim.vocabulary.input_kinds import without_command
@@ -242,6 +242,7 @@ def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[RunColu
             time = _chosen(block, choices.time, "--time", where)[0]
         elif clocks:
             time = clocks[0]
+            _refuse_split_clock(clocks, where)
             if len(clocks) > 1:
                 which = f"times from '{time.name}', the first of {len(clocks)} columns of times"
                 remarks.append(doubt(f"{which}; --time names another"))
@@ -269,6 +270,20 @@ def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[RunColu
     if not pairs:
         _refuse_without_angle(table.channels, where)
     return pairs
+
+
+def _refuse_split_clock(clocks: Sequence[Channel], where: str) -> None:
+    """Refuse a clock of whole units beside a column of their fractions, such as seconds and milliseconds."""
+    first = clocks[0]
+    for other in clocks[1:]:
+        whole, part = (UNITS["time"].get(c.unit, 0.0) for c in (first, other))
+        known = np.isfinite(first.values) & np.isfinite(other.values)
+        stamps, rest = first.values[known], other.values[known] * part
+        within = 0.0 < part < whole and rest.size and rest.min() >= 0.0 and rest.max() < whole
+        if within and (stamps == np.round(stamps)).all() and (np.diff(stamps) == 0.0).any():
+            what = f"the times are in two columns, {listed((first, other))}"
+            remedy = f"write one column of times, or give --time, one of {listed((first, other))}"
+            raise TunnelError(what, where=where, remedy=remedy)
 
 
 def _pair(time: Channel, reading: Channel, run: str = "", said: tuple[str, ...] = ()) -> RunColumns:

@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from tunnel_sim.files.importing.formats.cells import is_number
-from tunnel_sim.files.importing.formats.text import Layout, facts_in, find_layout, tables_of
+from tunnel_sim.files.importing.formats.layout import Layout, facts_in, find_layout
+from tunnel_sim.files.importing.formats.text import tables_of
 from tunnel_sim.files.importing.tables import LEAST_ROWS, Table, by_run, hold_order
 from tunnel_sim.files.readers import Reader, faults
 from tunnel_sim.files.reading import check_count

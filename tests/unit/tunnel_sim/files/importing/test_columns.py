@@ -9,7 +9,7 @@ from tunnel_sim import TunnelError
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.column_names import named_kind
 from tunnel_sim.files.importing.columns import find_pairs
-from tunnel_sim.files.importing.formats.text import find_layout
+from tunnel_sim.files.importing.formats.layout import find_layout
 from tunnel_sim.files.importing.tables import Channel, Table
 
 TIME = 0.05 * np.arange(200)

@@ -14,7 +14,8 @@ from tests.support.import_files import Text, any_dialect, csv, decay, written
 from tunnel_sim import TunnelError
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.columns import find_pairs
-from tunnel_sim.files.importing.formats.text import facts_in, find_dialect
+from tunnel_sim.files.importing.formats.layout import facts_in
+from tunnel_sim.files.importing.formats.text import find_dialect
 from tunnel_sim.files.importing.records import read_records
 from tunnel_sim.files.importing.tables import Channel, Table
 from tunnel_sim.files.importing.units import known_unit, split_unit
@@ -253,6 +254,39 @@ def test_a_short_table_beside_the_record_is_no_part_of_it(above: str, below: str
     (run,) = read_records([path]).campaign.runs
     np.testing.assert_allclose(run.record.time_s, time, atol=1e-9)
     np.testing.assert_allclose(run.record.yaw_rad, angle, atol=1e-8)
+
+
+def test_commas_between_columns_and_in_numbers_need_quotes(tmp_path: Path) -> None:
+    time, angle = decay()
+    rows = [
+        [f"{t:.3f}".replace(".", ","), f"{y:.6f}".replace(".", ",")] for t, y in zip(time, angle, strict=True)
+    ]
+    bare = "\n".join(["t [s],yaw [rad]", *map(",".join, rows)])
+    with pytest.raises(TunnelError, match="commas separate the columns, and are decimal signs as well"):
+        read_records([written(tmp_path, "bare.csv", bare)])
+    quoted = "\n".join(['"t [s]","yaw [rad]"', *(f'"{t}","{y}"' for t, y in rows)])
+    (run,) = read_records([written(tmp_path, "quoted.csv", quoted)]).campaign.runs
+    np.testing.assert_allclose(run.record.yaw_rad, angle, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("head", "row"),
+    [('"time_s" "yaw_rad"', '"{}" {:.3f} {:.8f}'), ("time_s,yaw_rad", "{},{:.3f},{:.8f}")],
+)
+def test_the_numbers_of_rows_may_have_no_name(head: str, row: str, tmp_path: Path) -> None:
+    time, angle = decay()
+    rows = [row.format(i, t, y) for i, (t, y) in enumerate(zip(time, angle, strict=True), 1)]
+    (run,) = read_records([written(tmp_path, "log.txt", "\n".join([head, *rows]))]).campaign.runs
+    np.testing.assert_allclose(run.record.time_s, time, atol=1e-9)
+    np.testing.assert_allclose(run.record.yaw_rad, angle, atol=1e-8)
+
+
+def test_seconds_and_milliseconds_in_two_columns_are_no_clock(tmp_path: Path) -> None:
+    time, angle = decay()
+    rows = [f"{int(t + 7)},{1e3 * (t % 1.0):.0f},{y:.8f}" for t, y in zip(time, angle, strict=True)]
+    path = written(tmp_path, "log.csv", "\n".join(["Second,ms,yaw [rad]", *rows]))
+    with pytest.raises(TunnelError, match="the times are in two columns, 'Second', 'ms'"):
+        read_records([path])
 
 
 def test_a_quote_ends_a_cell_only_before_a_delimiter() -> None:
