@@ -192,7 +192,7 @@ def in_seconds(
             raise asking("--time NAME", "no column of times", where, ", or --rate in Hz")
         why = f"times at {1.0 / interval:.6g} Hz: {origin}"
         return RunColumn(NO_CHANNEL, np.arange(count, dtype=np.float64) * interval, "s", "time", (why,))
-    _refuse_unread(times, where)
+    _refuse_faulty(times, where)
     values, remarks = without_overflow(times.values)
     unit = stated_unit(choices.time_unit, ("time",), "--time-unit") or times.unit
     if unit and kind_of(unit) != "time":
@@ -208,12 +208,11 @@ def in_seconds(
     return RunColumn(times, values, unit, "time", tuple(remarks))
 
 
-def _refuse_unread(channel: Channel, where: str) -> None:
-    """Refuse a column with a part of its numbers in an unknown form: the rest is not the record."""
-    if channel.unread:
-        what = f"{channel.quoted} has numbers such as '{one_line(channel.unread, 20)}', in an unknown form"
-        remedy = "write them without brackets, units and separators of thousands, or state --decimal"
-        raise TunnelError(what, where=where, remedy=remedy)
+def _refuse_faulty(channel: Channel, where: str) -> None:
+    """Refuse a column whose numbers are not those of one record."""
+    if channel.fault:
+        what, remedy = channel.fault
+        raise TunnelError(f"{channel.quoted} {what}", where=where, remedy=remedy)
 
 
 def _ask_for_unit(channel: Channel, kinds: Sequence[str], option: str, where: str) -> None:
@@ -265,7 +264,7 @@ def in_radians(
     Args:
         timed: the readings of the column, NaN where there is no time.
     """
-    _refuse_unread(reading, where)
+    _refuse_faulty(reading, where)
     linear = linear_unit(choices.unit or reading.unit or column_unit(reading.name))
     if linear is not None and choices.counts_per_turn is None and calibration is None:
         of, unit, factor = linear
@@ -287,7 +286,8 @@ def in_radians(
         what = f"{reading.quoted} holds no number where the file states a time"
         raise TunnelError(what, where=where, remedy="leave the file out, or name another column by --angle")
     if calibration is not None:
-        volts = values * UNITS["voltage"].get(unit, 1.0)
+        own = unit if kind_of(unit) == "voltage" else reading.unit
+        volts = values * UNITS["voltage"].get(own, 1.0)
         first, second = calibration
         if isinstance(first, float):
             values = first + second * volts

@@ -39,7 +39,7 @@ from tunnel_sim.files.importing.inputs import (
 )
 from tunnel_sim.files.importing.remarks import doubt
 from tunnel_sim.files.importing.tables import NO_CHANNEL, Channel, RunColumn, Table, is_input
-from tunnel_sim.files.importing.units import UNITS, claims, kind_of
+from tunnel_sim.files.importing.units import UNITS, claims, kind_of, unit_after_word
 from tunnel_sim.vocabulary.errors import TunnelError, asking, attempt, did_you_mean, joined, one_line
 from tunnel_sim.vocabulary.freedom import DISPLACEMENT, FREEDOMS, column_unit, freedom_of_column, linear_unit
 from tunnel_sim.vocabulary.input_kinds import without_command
@@ -124,6 +124,8 @@ def _as_numbers(
     # A row without a time is not a sample: a heading between two runs may hold other numbers.
     timed = channel.values if time is None else np.where(np.isfinite(time.values), channel.values, np.nan)
     reading = attempt(faults, lambda: in_radians(channel, timed, choices, calibration, where))
+    if reading is not None and not channel.unit and choices.unit is None and calibration is None:
+        attempt(faults, partial(_refuse_other_unit, reading, table, where))
     driven = None
     if reading is not None:
         driven = attempt(faults, partial(find_input, table.channels, clock, reading, choices, where))
@@ -138,6 +140,16 @@ def _as_numbers(
             remarks.append(f"{driven.channel.quoted} has no sample at {outside.sum()} of {rows}: left out")
             reading = replace(reading, values=np.where(outside, np.nan, reading.values))
     return RunColumns(run.run, time, reading, driven, tuple(remarks))
+
+
+def _refuse_other_unit(reading: RunColumn, table: Table, where: str) -> None:
+    """Refuse a guessed unit of an angle beside a text that states another one."""
+    for name, text in table.texts.items():
+        line = text if name.startswith("line ") else f"{name.rpartition('/')[2]}: {text}"
+        unit = unit_after_word(line)
+        if unit is not None and kind_of(unit) == "angle" and unit != reading.unit:
+            what = f"'{one_line(line, 40)}' may state the unit of {reading.channel.quoted}"
+            raise asking(f"--unit {unit}", what, where, f", or --unit {reading.unit}")
 
 
 def _unused(table: Table, columns: RunColumns, choices: ImportChoices) -> list[str]:

@@ -77,6 +77,7 @@ _RUN = r"(?:run|trial|test|swing|rep|versuch|messung|lauf)"
 _OF_RUN = re.compile(rf"(?i)[\s_]+{_RUN}[\s_#.-]*\d+\s*$")
 _LIKE_A_UNIT = re.compile(rf"(?!(?i:{_RUN})$)(?:[^\W\d_]|[°%])+(?:[.^/·*-]*[^\W\d_])*\^?-?[23²³]?")
 _TEMPERATURE = re.compile(r"(?i)temperat|(?<![a-z])temp(?![a-z])")
+_UNIT_WORD = re.compile(r"(?i)(?:unit|einheit)(?:s|en)?\W+([^\s,;:=]+)\W*$")
 _LONGEST = 10  # characters: a longer word is not a unit
 
 
@@ -128,6 +129,12 @@ def claims(text: str, name: str, unit: str) -> bool:
 def _bare(name: str) -> str:
     """A name without the unknown unit that `split_unit` leaves in it; the number of a channel remains."""
     return re.sub(r"\s*[(\[{<](?!\d+[)\]}>]).*", "", name)
+
+
+def unit_after_word(text: str) -> str | None:
+    """The known unit in a text such as ``angle_unit: deg``; None if there is none."""
+    found = _UNIT_WORD.search(text)
+    return None if found is None else known_unit(found[1])
 
 
 def unit_beside(name: str, text: str) -> str:

@@ -48,6 +48,18 @@ class Layout:
         return next((i for i, (name, unit) in columns if names_runs(name) and not unit), None)
 
 
+def changed_columns(layout: Layout, row: Sequence[object]) -> dict[int, str]:
+    """The columns that another heading below the first one gives another unit or place, and what it states."""
+    cells = [cell.strip(' "') if isinstance(cell, str) else "" for cell in row]
+    found = {}
+    for i, (name, unit) in enumerate(map(split_unit, cells)):
+        moved = name != layout.names[i] and name in layout.names
+        other_unit = known_unit(unit) is not None and layout.units[i] not in ("", unit)
+        if cells[i] and (moved or other_unit):
+            found[i] = cells[i]
+    return found
+
+
 def facts_in(lines: Sequence[str]) -> dict[str, float]:
     """Numbers stated in lines, such as ``Sample rate: 1000 Hz`` or ``V = 54 km/h``, by name and unit.
 

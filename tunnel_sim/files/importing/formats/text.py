@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import polars as pl
 
 from tunnel_sim.files.importing.choices import ImportChoices
-from tunnel_sim.files.importing.condition_names import mentions_wind
+from tunnel_sim.files.importing.condition_names import condition_of, mentions_wind
 from tunnel_sim.files.importing.formats.cells import (
     MISSING,
     as_numbers,
@@ -22,12 +23,20 @@ from tunnel_sim.files.importing.formats.cells import (
     is_number,
     like_number,
     seconds_of_day,
+    series_by,
     unread_in,
     without_short_tables,
     without_thousands,
 )
-from tunnel_sim.files.importing.formats.layout import LONGEST_LINE, Layout, facts_in, find_layout
+from tunnel_sim.files.importing.formats.layout import (
+    LONGEST_LINE,
+    Layout,
+    changed_columns,
+    facts_in,
+    find_layout,
+)
 from tunnel_sim.files.importing.tables import LEAST_ROWS, Channel, Table, by_texts, hold_order
+from tunnel_sim.files.importing.units import kind_of, names_a_time, split_unit, unit_after_word
 from tunnel_sim.files.readers import Reader
 from tunnel_sim.files.reading import check_count, check_lines, check_utf8, read_regular
 from tunnel_sim.vocabulary import limits
@@ -39,6 +48,9 @@ _DAY = 86400.0  # s
 _HEAD, _MIDDLE = 2**18, 2**14  # number of inspected bytes
 _MINUS = re.compile("(?:\N{MINUS SIGN}|\N{EN DASH})(?=[0-9.,])".encode())
 """A minus that programs write as in print."""
+_OF_SERIES = re.compile(r"(?i)variable|signal|channel|quantity|metric|topic|kanal|mess?gr(ö|oe)(ß|ss)e")
+"""Names of a column that gives the quantity of each row."""
+_MOST_BELOW = 1000  # number of inspected lines of texts below the first row of numbers
 _LOOKED_AT = 1000  # number of texts of a column that show whether they are times of day
 _HEAD_LINES = 400
 _NAMES = {"tab": "\t", ";": ";", ",": ",", "|": "|", "blank": " "}
@@ -74,6 +86,7 @@ def read_text_tables(
         "give the file the ending of its format (.xlsx, .mat, .tdms, .h5, .parquet), or save it again as text"
     )
     check_lines(content, where, nul)
+    content = _without_doubled_ends(content)
     if not content.isascii():
         content = _MINUS.sub(b"-", content)
     head = content[:_HEAD].decode(errors="replace").splitlines()
@@ -116,10 +129,28 @@ def read_text_tables(
     texts = {
         f"line {i}": line.strip()
         for i, line in enumerate(head[: layout.first], 1)
-        if len(line) <= LONGEST_LINE and mentions_wind(line) and not facts_in([line])
+        if len(line) <= LONGEST_LINE
+        and (mentions_wind(line) or unit_after_word(line) is not None)
+        and not facts_in([line])
     }
-    table = Table((), remarks=(remark,), facts=layout.facts, texts=texts)
+    below = _texts_below(content, layout.first)
+    table = Table((), remarks=(remark,), facts=_contested(layout.facts, below), texts=texts)
     return tables_of(frame, layout, dialect.decimal, labels, table), known
+
+
+def _texts_below(content: bytes, first: int) -> list[str]:
+    """Some lines of texts below the first row of numbers."""
+    found = re.compile(rb"(?m)^[^\w\n]*[A-Za-z\x80-\xff][^\n]*").finditer(content, _start_of(content, first))
+    return [line[0].decode(errors="replace") for line in islice(found, _MOST_BELOW)]
+
+
+def _contested(facts: Mapping[str, float], below: Sequence[str]) -> dict[str, float]:
+    """Numbers above a table; NaN for a condition of which lines between its rows state another one."""
+    stated = dict(facts)
+    for heading, value in facts_in(below).items():
+        if condition_of(*split_unit(heading), alone=True) is not None and stated.get(heading) != value:
+            stated[heading] = float("nan")
+    return stated
 
 
 def check_table(content: bytes, width: int, where: str) -> None:
@@ -174,10 +205,15 @@ def frame_of(
 
 def _has_points(content: bytes, first: int) -> bool:
     """Whether a table has a point in a row of numbers, the first of which is given."""
+    return content.find(b".", _start_of(content, first)) >= 0
+
+
+def _start_of(content: bytes, line: int) -> int:
+    """The place at which a line begins."""
     start = 0
-    for _ in range(first):
+    for _ in range(line):
         start = content.find(b"\n", start) + 1
-    return content.find(b".", start) >= 0
+    return start
 
 
 def _cells(line: str, dialect: Dialect) -> list[str]:
@@ -213,6 +249,13 @@ def find_dialect(body: Sequence[str], choices: ImportChoices) -> Dialect | None:
             if (round(share, 1), width) > score:
                 best, score = Dialect(delimiter, decimal, width), (round(share, 1), width)
     return best
+
+
+def _without_doubled_ends(content: bytes) -> bytes:
+    """Lines without the blank line after each of them that doubled line ends make."""
+    content = content.replace(b"\r\r\n", b"\n")
+    blank = len(re.findall(rb"\n\r?(?=\n)", content))
+    return re.sub(rb"\n\r?(?=\n)", b"", content) if 5 * blank > 2 * content.count(b"\n") else content
 
 
 def _has_halves(body: Sequence[str], dialect: Dialect) -> bool:
@@ -254,13 +297,20 @@ def tables_of(
 ) -> list[Table]:
     """The tables of a sheet with its columns of numbers or times of day: one, or one for each run of the labels."""
     channels, notes = [], {-1: table.remarks[0]}
-    frame, below = without_short_tables(frame, decimal)
+    texts: dict[str, pl.Series] = {}
+    frame, headings, below = without_short_tables(frame, decimal)
+    faults = {}
+    for row in headings:
+        for i, cell in changed_columns(layout, frame.row(row)).items():
+            what = f"has another heading below the first one, '{one_line(cell, 40)}'"
+            faults[i] = (what, "write each table into a file of its own")
     for i, (name, unit, column) in enumerate(
         zip(layout.names, layout.units, frame.get_columns(), strict=True)
     ):
         if i in layout.beside:
             continue
-        number, lost, unread = column, 0, ""
+        number, lost = column, 0
+        fault: tuple[str, ...] = faults.get(i, ())
         if column.dtype == pl.String and name == "drive_hold":
             number = column.map_elements(hold_order, return_dtype=pl.Float64).fill_nan(None)
             lost = number.null_count() - column.null_count()
@@ -278,15 +328,37 @@ def tables_of(
                 notes[i] = f"the column '{name}' holds times of day, taken as seconds"
         elif lost:
             notes[i] = f"{counted(lost, 'text')} in the column '{name}' taken as missing"
-            unread = unread_in(column, number)
+            fault = fault or unread_in(column, number)
         if number.null_count() < number.len():
-            channels.append(Channel(name, number.fill_null(float("nan")).to_numpy(), unit, i + 1, unread))
+            channels.append(Channel(name, number.fill_null(float("nan")).to_numpy(), unit, i + 1, fault))
+        elif column.dtype == pl.String:
+            texts[name] = column
+    channels = [_with_series(channel, texts) for channel in channels]
     table = replace(table, channels=tuple(channels), headed=layout.headed)
     tables = [table]
     if labels is not None and layout.runs is not None and labels.len() == frame.height:
         tables = by_texts(table, layout.names[layout.runs], labels)
     said = tuple(note for i, note in notes.items() if not (tables[0].named and i == layout.runs))
     return [replace(one, remarks=(*said, *below, *one.remarks[1:])) for one in tables]
+
+
+def _with_series(channel: Channel, texts: Mapping[str, pl.Series]) -> Channel:
+    """A column, with the fault that it holds several series where a column of texts distinguishes them."""
+    for name, labels in texts.items():
+        named = labels.n_unique() if _OF_SERIES.fullmatch(name) else 1
+        series = series_by(labels, channel.values) if named == 1 else named
+        if (
+            series > 1
+            and not channel.fault
+            and kind_of(channel.unit) != "time"
+            and not names_a_time(channel.name)
+        ):
+            what = f"holds {series} series, by the column '{one_line(name, 40)}'"
+            remedy = (
+                "write each series into a column or a file of its own, or leave out the rows of the others"
+            )
+            return replace(channel, fault=(what, remedy))
+    return channel
 
 
 def read_cells(path: Path) -> tuple[list[str], list[list[str]]]:

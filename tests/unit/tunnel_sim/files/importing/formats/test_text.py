@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.support.import_files import Text, any_dialect, csv, decay, written
+from tests.support.import_files import RATE, Text, any_dialect, csv, decay, written
 from tunnel_sim import TunnelError
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.columns import find_pairs
@@ -287,6 +287,78 @@ def test_seconds_and_milliseconds_in_two_columns_are_no_clock(tmp_path: Path) ->
     path = written(tmp_path, "log.csv", "\n".join(["Second,ms,yaw [rad]", *rows]))
     with pytest.raises(TunnelError, match="the times are in two columns, 'Second', 'ms'"):
         read_records([path])
+
+
+def tidy(time: np.ndarray, angle: np.ndarray) -> dict[str, list[str]]:
+    """Rows of times, texts and readings: two series in one column, or one with a text beside it."""
+    rate = np.gradient(angle, time)
+    values = list(zip(time, angle, rate, strict=True))
+    return {
+        "t,variable,value": [
+            *(f"{t:.4f},angle,{y:.6f}" for t, y, _ in values),
+            *(f"{t:.4f},rate,{v:.6f}" for t, _, v in values),
+        ],
+        "t,sensor,yaw": [
+            row for t, y, v in values for row in (f"{t:.4f},a,{y:.6f}", f"{t + 0.002:.4f},b,{v:.6f}")
+        ],
+        "t,status,yaw": [
+            f"{t:.4f},OK,{y:.6f}" if i % 40 else f"{t:.4f},ERR,0.0" for i, (t, y, _) in enumerate(values)
+        ],
+    }
+
+
+@pytest.mark.parametrize(("name", "column"), [("value", "variable"), ("yaw", "sensor"), ("yaw", "status")])
+def test_series_that_a_column_of_texts_distinguishes_are_not_one(
+    name: str, column: str, tmp_path: Path
+) -> None:
+    head = f"t,{column},{name}"
+    path = written(tmp_path, "log.csv", "\n".join([head, *tidy(*decay())[head]]))
+    with pytest.raises(TunnelError, match=f"'{name}' holds 2 series, by the column '{column}'"):
+        read_records([path])
+
+
+def test_texts_beside_one_series_distinguish_none(tmp_path: Path) -> None:
+    time, angle = decay()
+    rows = [
+        f"{'TRUE' if i % 7 else 'FALSE'},{t:.3f},{y:.8f}"
+        for i, (t, y) in enumerate(zip(time, angle, strict=True))
+    ]
+    (run,) = read_records([written(tmp_path, "a.csv", "\n".join(["valid,t,yaw", *rows]))]).campaign.runs
+    np.testing.assert_allclose(run.record.yaw_rad, angle, atol=1e-8)
+    rows = [f"E{k},{t:.3f},{y:.8f}" for k in (1, 2, 3) for t, y in zip(*decay(k), strict=True)]
+    path = written(tmp_path, "b.csv", "\n".join(["experiment,t,yaw", *rows]))
+    assert len(read_records([path]).campaign.runs) == 3
+
+
+@pytest.mark.parametrize(
+    ("heading", "factors", "match"),
+    [
+        ("t [s],yaw [deg]", (1.0, 1.0), "'yaw' has another heading below the first one, 'yaw \\[deg\\]'"),
+        ("t [ms],yaw [rad]", (1e3, 1.0), "'t' has another heading below the first one, 't \\[ms\\]'"),
+        ("V = 10 m/s\nt [s],yaw [rad]", (1.0, 1.0), "'V' is left out: the file states several numbers"),
+    ],
+)
+def test_another_heading_below_the_first_one_counts(
+    heading: str, factors: tuple[float, float], match: str, tmp_path: Path
+) -> None:
+    time, angle = decay()
+    below = [f"{factors[0] * t:.3f},{y:.8f}" for t, y in zip(*decay(2), strict=True)]
+    above = [f"{t:.3f},{y:.8f}" for t, y in zip(time, angle, strict=True)]
+    lines = ["V = 0 m/s", "t [s],yaw [rad]", *above, "", heading, *below]
+    with pytest.raises(TunnelError, match=match):
+        read_records([written(tmp_path, "log.csv", "\n".join(lines))])
+
+
+@pytest.mark.parametrize("end", ["\r\r\n", "\n\n", "\r\n\r\n"])
+def test_doubled_line_ends_are_one(end: str, tmp_path: Path) -> None:
+    time, angle = decay()
+    path = csv(tmp_path)
+    path.write_bytes(path.read_bytes().replace(b"\n", end.encode()))
+    (run,) = read_records([path]).campaign.runs
+    np.testing.assert_allclose(run.record.time_s, time, atol=1e-9)
+    only = written(tmp_path, "only.csv", end.join(["yaw [rad]", *(f"{y:.8f}" for y in angle)]))
+    (run,) = read_records([only], ImportChoices(rate=RATE)).campaign.runs
+    np.testing.assert_allclose(run.record.time_s, time, atol=1e-9)
 
 
 def test_a_quote_ends_a_cell_only_before_a_delimiter() -> None:
