@@ -59,16 +59,21 @@ def without_thousands(column: pl.Series) -> pl.Series:
     return pl.select(pl.when(grouped).then(None).otherwise(column)).to_series()
 
 
-def without_short_tables(frame: pl.DataFrame, decimal: str) -> tuple[pl.DataFrame, list[int], list[str]]:
+def without_short_tables(
+    frame: pl.DataFrame, decimal: str, texts: pl.DataFrame
+) -> tuple[pl.DataFrame, list[int], list[str]]:
     """Rows without the numbers of short tables below other headings, such as one of peaks.
 
     The rows remain, so that the others can be counted.
 
+    Args:
+        texts: the rows with their texts, which a workbook does not have in columns of numbers.
+
     Returns:
         The rows, the indices of rows of texts above long tables, and a remark.
     """
-    strings = [column for column in frame.get_columns() if column.dtype == pl.String]
-    if frame.width < 2 or not strings:
+    strings = [column for column in texts.get_columns() if column.dtype == pl.String]
+    if frame.width < 2 or not strings or texts.height != frame.height:
         return frame, [], []
     words = np.any([c.str.contains(_WORD).fill_null(value=False).to_numpy() for c in strings], axis=0)
     if not words.any():
@@ -76,10 +81,10 @@ def without_short_tables(frame: pl.DataFrame, decimal: str) -> tuple[pl.DataFram
     convert = partial(as_numbers, decimal=decimal)
     cells = [in_parts(c, convert) if c.dtype == pl.String else c for c in frame.get_columns()]
     numbers = np.sum([column.is_not_null().to_numpy() for column in cells], axis=0)
-    texts = np.flatnonzero(words & (numbers == 0))
+    named = np.flatnonzero(words & (numbers == 0))
     short = np.zeros(frame.height, dtype=bool)
     headings = []
-    for a, b in itertools.pairwise([*texts.tolist(), frame.height]):
+    for a, b in itertools.pairwise([*named.tolist(), frame.height]):
         filled = a + np.flatnonzero(numbers[a:b] > 0)
         short[filled] = filled.size < LEAST_ROWS
         headings += [a] if filled.size >= LEAST_ROWS else []

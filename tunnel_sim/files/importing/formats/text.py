@@ -134,7 +134,7 @@ def read_text_tables(
         and not facts_in([line])
     }
     below = _texts_below(content, layout.first)
-    table = Table((), remarks=(remark,), facts=_contested(layout.facts, below), texts=texts)
+    table = Table((), remarks=(remark,), facts=contested(layout.facts, below), texts=texts)
     return tables_of(frame, layout, dialect.decimal, labels, table), known
 
 
@@ -144,7 +144,7 @@ def _texts_below(content: bytes, first: int) -> list[str]:
     return [line[0].decode(errors="replace") for line in islice(found, _MOST_BELOW)]
 
 
-def _contested(facts: Mapping[str, float], below: Sequence[str]) -> dict[str, float]:
+def contested(facts: Mapping[str, float], below: Sequence[str]) -> dict[str, float]:
     """Numbers above a table; NaN for a condition of which lines between its rows state another one."""
     stated = dict(facts)
     for heading, value in facts_in(below).items():
@@ -293,15 +293,25 @@ def as_utf8(content: bytes, where: str) -> tuple[bytes, str]:
 
 
 def tables_of(
-    frame: pl.DataFrame, layout: Layout, decimal: str, labels: pl.Series | None, table: Table
+    frame: pl.DataFrame,
+    layout: Layout,
+    decimal: str,
+    labels: pl.Series | None,
+    table: Table,
+    written: pl.DataFrame | None = None,
 ) -> list[Table]:
-    """The tables of a sheet with its columns of numbers or times of day: one, or one for each run of the labels."""
+    """The tables of a sheet with its columns of numbers or times of day: one, or one for each run of the labels.
+
+    Args:
+        written: the rows with all their texts; None: they are in the frame.
+    """
     channels, notes = [], {-1: table.remarks[0]}
     texts: dict[str, pl.Series] = {}
-    frame, headings, below = without_short_tables(frame, decimal)
+    written = frame if written is None else written
+    frame, headings, below = without_short_tables(frame, decimal, written)
     faults = {}
     for row in headings:
-        for i, cell in changed_columns(layout, frame.row(row)).items():
+        for i, cell in changed_columns(layout, written.row(row)).items():
             what = f"has another heading below the first one, '{one_line(cell, 40)}'"
             faults[i] = (what, "write each table into a file of its own")
     for i, (name, unit, column) in enumerate(
