@@ -135,6 +135,7 @@ def test_a_rate_beside_the_angle_is_not_taken_for_it(tmp_path: Path) -> None:
         ("{}", 24),
         ("2026-03-01 {}", 24),
         ("2026-03-01T{}Z", 24),
+        ("2026-03-01 {} UTC", 24),
         ('"{}"', 24),
         ("{} {half}M", 12),
         ("3/1/2026 {}{half}m", 12),
