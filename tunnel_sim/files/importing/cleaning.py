@@ -118,7 +118,7 @@ def cleaned(time: Times, reading: Readings) -> Cleaned:
     if ordered and differing > _COARSE * time.size and time[0] < time[-1]:
         series = _series(time, reading)
         if series > 1:
-            what = f"every time has {series} rows, whose readings belong to {series} series"
+            what = f"every time has {counted(series, 'row')}, whose readings belong to as many series"
             raise TunnelError(what, remedy="write each series into a column or a file of its own")
         remarks.append(
             f"{differing} time stamps repeat although the readings differ: the stamps are coarser than the "

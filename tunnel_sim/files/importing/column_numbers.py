@@ -176,7 +176,8 @@ def without_codes(values: Rows) -> tuple[Rows, list[str]]:
         if standing is None or standing.sum() < 2:
             break
         code = float(values[known[standing][0]])
-        remarks.append(f"{int(standing.sum())} readings of {code:.6g}, far from all others, taken as missing")
+        many = counted(int(standing.sum()), "reading")
+        remarks.append(f"{many} of {code:.6g}, far from all others, taken as missing")
         values = values.copy()
         values[known[standing]] = np.nan
     return values, remarks

@@ -25,7 +25,10 @@ _GROUPED = {
     ",": re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3})+(,\d+)?"),
 }
 """Numbers with separators of thousands: they show the decimal sign of a file, and are not read."""
-_CLOCK = r"(?:^|[ T])(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?)(?:\s*([AaPp])\.?[Mm]\.?|Z|\s*(?:UTC|GMT)|[+-]\d{2}:?\d{2})?$"
+_CLOCK = (
+    r"(?:^|[ T])(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?)"
+    r"(?:\s*([AaPp])\.?[Mm]\.?|Z|\s*(?:UTC|GMT)|[+-]\d{2}:?\d{2})?$"
+)
 _LIKE_A_NUMBER = r"^\W{0,3}\d"
 _PART = 2**20  # number of texts converted at once
 _WORD = r"^\W*[^\W\d_]{2}"
