@@ -23,6 +23,7 @@ _RESTARTS = 0.01  # share of backward steps up to which the clock restarts and t
 _FEW_RESTARTS = 3  # in a short record
 _FEW = 0.1  # share of rows out of order that a logger may mix up; more of them are several runs
 _SMOOTH = 0.1  # white noise in a smooth reading, relative to its swing
+_APART = 3.0  # ratio of the roughness of alternating series in one column to their own
 _ROUNDED = 1e-9  # share of the range: readings that differ by less are equal
 _FLAT = 3  # samples: a shorter peak may be flat by chance
 _FLATTER = 5  # ratio of samples at the last level to the level below: a parabola reaches at most 2.4
@@ -54,7 +55,7 @@ class Cleaned:
         return self.time_s + self.first_s
 
 
-def restarts(time: Times) -> list[int]:
+def restarts(time: Times, reading: Readings) -> list[int]:
     """Indices at which the times restart because another run follows; empty: none.
 
     Rows without a time, such as a blank line or a repeated heading between two runs, do not hide a restart.
@@ -68,19 +69,20 @@ def restarts(time: Times) -> list[int]:
     parts = [clock[a:b] for a, b in itertools.pairwise(starts)]
     # another run begins near the time of the first start, and not slightly before the previous row
     early = all(part[0] - clock[0] <= 0.1 * np.ptp(parts[0]) for part in parts[1:])
-    if not early and not _interleaved(clock, starts):
+    if not early and not _interleaved(clock, reading[known], starts):
         return []
     return [int(place) for place in known[back]]
 
 
-def _interleaved(clock: Times, starts: Sequence[int]) -> bool:
+def _interleaved(clock: Times, reading: Readings, starts: Sequence[int]) -> bool:
     """Whether sorting would mix the rows of parts that are long enough for runs."""
     part = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
     long = np.isin(part, np.flatnonzero(np.diff(starts) >= LEAST_ROWS))
     order = np.argsort(clock[long], kind="stable")
     changes = np.count_nonzero(np.diff(part[long][order]))
-    shared = np.count_nonzero(np.diff(clock[long][order]) == 0.0)  # rows that two parts repeat
-    return bool(changes > len(starts) + 2 * shared)
+    readings = np.nan_to_num(reading[long][order])
+    same = (np.diff(clock[long][order]) == 0.0) & (np.diff(readings) == 0.0)
+    return bool(changes > len(starts) + 2 * np.count_nonzero(same))  # rows that two parts repeat
 
 
 def cleaned(time: Times, reading: Readings) -> Cleaned:
@@ -96,6 +98,9 @@ def cleaned(time: Times, reading: Readings) -> Cleaned:
         if inside:
             remarks.append(f"{counted(inside, 'sample')} without a number left out")
         time, reading = time[rows], reading[rows]
+    if time.size > 1 and time[0] > time[-1] and not (np.diff(time) > 0.0).any():
+        rows, time, reading = rows[::-1], time[::-1], reading[::-1]
+        remarks.append("rows from the last to the first put in their order")
     ordered = not (np.diff(time) < 0.0).any()
     if not ordered:
         moved, order = _out_of_order(time), np.argsort(time, kind="stable")
@@ -111,11 +116,15 @@ def cleaned(time: Times, reading: Readings) -> Cleaned:
     repeated = same & (np.diff(reading) == 0.0)
     differing = np.count_nonzero(same & ~repeated)
     if ordered and differing > _COARSE * time.size and time[0] < time[-1]:
+        series = _series(time, reading)
+        if series > 1:
+            what = f"every time has {counted(series, 'row')}, whose readings belong to as many series"
+            raise TunnelError(what, remedy="write each series into a column or a file of its own")
         remarks.append(
             f"{differing} time stamps repeat although the readings differ: the stamps are coarser than the "
             "sampling, and evenly spaced times are used instead"
         )
-        time = _spread(time, rows)
+        time = _spread(time, np.abs(rows - rows[0]))
     elif same.any():
         keep = np.concatenate([[True], ~same])
         further = (
@@ -168,15 +177,44 @@ def _of_one_run(time: Times, reading: Readings) -> bool:
     return bool(even and jumps.size and np.sqrt(np.mean(jumps**2) / 70.0) <= _SMOOTH * reading.std())
 
 
+def _series(time: Times, reading: Readings) -> int:
+    """The number of series whose rows alternate, such as signals in one column; 1 where stamps are coarse.
+
+    Readings between coarse stamps continue each other, and those of another series do not.
+    """
+    firsts = np.concatenate([[0], np.flatnonzero(np.diff(time)) + 1, [time.size]])
+    each = np.diff(firsts)
+    usual = int(np.median(each))
+    whole = firsts[:-1][each == usual]
+    if usual < 2 or whole.size < max(LEAST_ROWS, (1.0 - _FEW) * each.size):
+        return 1
+    rows = reading[whole[:, np.newaxis] + np.arange(usual)]
+    one, several = (float(np.mean(np.diff(part, 4, axis=0) ** 2)) for part in (rows.ravel(), rows))
+    return usual if one > _APART**2 * several else 1
+
+
 def _spread(time: Times, rows: NDArray[np.intp]) -> Times:
-    """Times spread evenly from each gap in coarse stamps to the next gap; a missing row keeps its time."""
+    """Times spread evenly from each gap in coarse stamps to the next gap; a missing row keeps its time.
+
+    A stamp is exact only where it follows another one: the first and the last may have fewer samples.
+    """
     firsts = np.concatenate([[0], np.flatnonzero(np.diff(time)) + 1])
     coarse = np.diff(time[firsts])
-    gaps = firsts[1:][coarse > _GAP * np.median(coarse)]
+    gaps = np.flatnonzero(coarse > _GAP * np.median(coarse)) + 1
+    parts = [firsts[a:b] for a, b in itertools.pairwise([0, *gaps.tolist(), firsts.size])]
+    ends = [*(int(part[0]) for part in parts[1:]), time.size]
     even = np.empty(time.size)
-    for a, b in itertools.pairwise([0, *gaps.tolist(), time.size]):
-        span = max(int(rows[b - 1] - rows[a]), 1)
-        even[a:b] = np.linspace(time[a], time[b - 1], span + 1)[rows[a:b] - rows[a]]
+    changes = [part[1:] for part in parts if part.size > 2]
+    away = [(rows[at] - rows[at].mean(), time[at] - time[at].mean()) for at in changes]
+    step = sum(float(i @ t) for i, t in away) / max(sum(float(i @ i) for i, _ in away), 1.0)
+    for part, b in zip(parts, ends, strict=True):
+        a, at = int(part[0]), part[1:]
+        if step > 0.0:
+            origin = float((time[at] - step * rows[at]).mean()) if at.size else time[a] - step * rows[a]
+            even[a:b] = origin + step * rows[a:b]
+        else:
+            span = max(int(rows[b - 1] - rows[a]), 1)
+            even[a:b] = np.linspace(time[a], time[b - 1], span + 1)[rows[a:b] - rows[a]]
     return even
 
 

@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from tunnel_sim.files.importing.choices import ImportChoices
-from tunnel_sim.files.importing.column_names import listed, named_kind, names_voltage
+from tunnel_sim.files.importing.column_names import ANGLE, listed, named_kind, names_voltage
 from tunnel_sim.files.importing.remarks import doubt
 from tunnel_sim.files.importing.source import read_source
 from tunnel_sim.files.importing.tables import NO_CHANNEL, Channel, RunColumn
 from tunnel_sim.files.importing.units import UNITS, kind_of, known_unit, written_unit
+from tunnel_sim.files.plausible import standing_for_missing
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import Quantity
 from tunnel_sim.vocabulary.errors import TunnelError, asking, counted, one_line, shown
@@ -27,7 +28,9 @@ _NEAR_END = 4.0  # multiple of the other steps: a jump leads from one end of the
 _MOST_JUMPS = 10  # minimum number of samples per jump
 _NEARLY = 0.75  # share of a counter's range: a step this long between two samples is an overflow
 _SMALL = 0.25  # share of the range: no other step is longer
-_SLOWEST_STEP = 0.5  # s: a longer step between samples is in milliseconds, or in microseconds
+_MOST_CODES = 3  # number of different codes for missing readings, such as one for each end of a range
+_SLOWEST_STEP = 0.5  # s: a longer step between samples is in a smaller unit
+_IN_USE = (1e9, 2.5e9)  # s: times since 1970, of the years 2001 to 2049, show their unit
 _HALF_TURN = pi  # half the span of an angle in radians: a greater span is in degrees
 _LONGEST_FORMULA = 200  # characters
 _NUMBER = r"([+-]?\s*(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
@@ -46,8 +49,9 @@ _RATE_FACTS = re.compile(
     r"(?i)(^|[^a-z])(fs|sample[ _]?rate|sampling[ _]?(rate|frequency)|samplerate|rate[ _]*\(?hz)($|[^a-z])"
 )
 _STEP_FACTS = re.compile(
-    r"(?i)(^|[^a-z])(ts|dt|delta_?t|sample[ _]?(time|interval)|sampling[ _]?(time|interval))($|[^a-z])"
+    r"(?i)(^|[^a-z])(ts|dt|delta[ _]?t|sample[ _]?(time|interval)|sampling[ _]?(time|interval))($|[^a-z])"
 )
+_HERTZ = {"khz": 1e3, "mhz": 1e6}
 _OWN_STEP = re.compile(r"(?i)^(wf_increment|delta_x|(x[ _]?)?increment)( \(s\))?$")
 
 _STEPS = (1.0 / limits.FASTEST_RATE, 1.0 / limits.SLOWEST_RATE)  # s
@@ -56,14 +60,19 @@ Calibration = tuple[PerSample, PerSample] | tuple[float, float]
 """Voltages and readings of a table; or offset and factor of a straight line."""
 
 
-def without_overflow(values: Rows) -> tuple[Rows, list[str]]:
-    """Readings of a counter or a single-turn sensor without jumps at the ends of its range; and remarks."""
+def without_overflow(values: Rows, turn: float | None = None) -> tuple[Rows, list[str]]:
+    """Readings of a counter or a single-turn sensor without jumps at the ends of its range; and remarks.
+
+    Args:
+        turn: a whole turn in the unit of the readings; None if it is not known.
+    """
     known = np.flatnonzero(np.isfinite(values))
     numbers = values[known]
     steps = np.diff(numbers)
     longest = float(np.abs(steps).max(initial=0.0))
     counts = longest >= _NEARLY * _COUNTERS[0] and bool((numbers == np.round(numbers)).all())
-    for full in (*_TURNS, *(_COUNTERS if counts else ())):
+    turns_by = _TURNS if turn is None else (turn,)
+    for full in (*turns_by, *(_COUNTERS if counts else ())):
         if not _NEARLY * full < longest <= full or np.ptp(numbers) > full:
             continue
         jumps = np.abs(steps) > _NEARLY * full
@@ -78,6 +87,22 @@ def without_overflow(values: Rows) -> tuple[Rows, list[str]]:
         result[known] = numbers + full * turns
         return result, [remark]
     return values, []
+
+
+def _turn_in(unit: str) -> float | None:
+    """A whole turn in a unit of angles; None of another unit."""
+    factor = UNITS["angle"].get(unit)
+    return None if factor is None else 2.0 * pi / factor
+
+
+def _continuous(values: Rows, turn: float | None) -> tuple[Rows, list[str]]:
+    """Readings without the overflow of a sensor and without codes for missing ones, and remarks."""
+    values, remarks = without_overflow(values, turn)
+    if remarks:  # the other end of a counter's range may also be far from all other readings
+        return values, remarks
+    values, codes = without_codes(values)
+    values, remarks = without_overflow(values, turn)
+    return values, [*codes, *remarks]
 
 
 def stated_unit(text: str | None, kinds: Sequence[str], option: str) -> str | None:
@@ -104,22 +129,58 @@ def sample_interval(facts: Mapping[str, float], choices: ImportChoices) -> tuple
     for pattern, is_rate in ((_OWN_STEP, False), (_RATE_FACTS, True), (_STEP_FACTS, False)):
         least, most = (limits.SLOWEST_RATE, limits.FASTEST_RATE) if is_rate else _STEPS
         for name, value in facts.items():
-            if pattern.search(name) and least <= value <= most:
-                return 1.0 / value if is_rate else float(value), f"'{name}' = {value:g} in the file"
+            word = re.split(r"[\s_(\[]+", name.rstrip(")] "))[-1]
+            factor = (
+                _HERTZ.get(word.lower(), 1.0) if is_rate else UNITS["time"].get(known_unit(word) or "", 1.0)
+            )
+            if pattern.search(name) and least <= value * factor <= most:
+                interval = 1.0 / (value * factor) if is_rate else float(value * factor)
+                return interval, f"'{name}' = {value:g} in the file"
     return None, ""
 
 
 def guessed_time_unit(values: Rows) -> tuple[str, float]:
     """The assumed unit of times without one, and the usual step in it."""
-    steps = np.diff(np.sort(values[np.isfinite(values)]))  # rows may be out of order
+    known = np.sort(values[np.isfinite(values)])  # rows may be out of order
+    steps = np.diff(known)
     step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
-    return "s" if step <= _SLOWEST_STEP else "ms" if step <= 1e3 * _SLOWEST_STEP else "us", step
+    units = {unit: UNITS["time"][unit] for unit in ("s", "ms", "us", "ns")}
+    first = float(known[0]) if known.size else 0.0
+    since = (unit for unit, factor in units.items() if _IN_USE[0] <= first * factor <= _IN_USE[1])
+    of_step = (unit for unit, factor in units.items() if step * factor <= _SLOWEST_STEP)
+    return next(since, None) or next(of_step, "ns"), step
 
 
 def guessed_angle_unit(values: Rows) -> tuple[str, float]:
     """The assumed unit of angles without one, and half their range in it."""
-    swing = 0.5 * float(np.nanmax(values) - np.nanmin(values))
+    swing = _swing(values)
     return "deg" if swing > _HALF_TURN else "rad", swing
+
+
+def _swing(values: Rows) -> float:
+    """Half the range of readings, without a single one far from all others."""
+    known = values[np.isfinite(values)]
+    standing = standing_for_missing(known) if known.size else None
+    return 0.5 * float(np.ptp(known if standing is None else known[~standing]))
+
+
+def without_codes(values: Rows) -> tuple[Rows, list[str]]:
+    """Readings without a number that stands for a missing one, such as -9999, and remarks.
+
+    A single reading far from all others may be one of the sensor, and is kept.
+    """
+    remarks = []
+    for _ in range(_MOST_CODES):
+        known = np.flatnonzero(np.isfinite(values))
+        standing = standing_for_missing(values[known]) if known.size else None
+        if standing is None or standing.sum() < 2:
+            break
+        code = float(values[known[standing][0]])
+        many = counted(int(standing.sum()), "reading")
+        remarks.append(f"{many} of {code:.6g}, far from all others, taken as missing")
+        values = values.copy()
+        values[known[standing]] = np.nan
+    return values, remarks
 
 
 def in_seconds(
@@ -132,6 +193,7 @@ def in_seconds(
             raise asking("--time NAME", "no column of times", where, ", or --rate in Hz")
         why = f"times at {1.0 / interval:.6g} Hz: {origin}"
         return RunColumn(NO_CHANNEL, np.arange(count, dtype=np.float64) * interval, "s", "time", (why,))
+    _refuse_faulty(times, where)
     values, remarks = without_overflow(times.values)
     unit = stated_unit(choices.time_unit, ("time",), "--time-unit") or times.unit
     if unit and kind_of(unit) != "time":
@@ -145,6 +207,13 @@ def in_seconds(
         remarks.append(doubt(f"{taken}; --time-unit changes this"))
     values = values * UNITS["time"][unit] if unit != "s" else values
     return RunColumn(times, values, unit, "time", tuple(remarks))
+
+
+def _refuse_faulty(channel: Channel, where: str) -> None:
+    """Refuse a column whose numbers are not those of one record."""
+    if channel.fault:
+        what, remedy = channel.fault
+        raise TunnelError(f"{channel.quoted} {what}", where=where, remedy=remedy)
 
 
 def _ask_for_unit(channel: Channel, kinds: Sequence[str], option: str, where: str) -> None:
@@ -178,6 +247,16 @@ def refuse_without_unit(channels: Sequence[Channel], where: str) -> None:
     raise asking(option, f"{listed(found)} {noun}", where, units)
 
 
+def _refuse_rate(reading: Channel, where: str) -> None:
+    """Refuse a column named as a rate or an acceleration with a unit of an angle."""
+    rate = "" if ANGLE.search(reading.name) else named_kind(reading.name)
+    if rate and kind_of(reading.unit) == "angle":
+        noun = "an acceleration" if rate == "acceleration" else "a rate"
+        what = f"{reading.quoted} is {noun} by its name, and in {reading.unit}, a unit of an angle"
+        remedy = f"give --unit, one of {', '.join(UNITS[rate])}, or {reading.unit} if it is an angle"
+        raise TunnelError(what, where=where, remedy=remedy)
+
+
 def in_radians(
     reading: Channel, timed: Rows, choices: ImportChoices, calibration: Calibration | None, where: str
 ) -> RunColumn:
@@ -186,11 +265,13 @@ def in_radians(
     Args:
         timed: the readings of the column, NaN where there is no time.
     """
+    _refuse_faulty(reading, where)
     linear = linear_unit(choices.unit or reading.unit or column_unit(reading.name))
     if linear is not None and choices.counts_per_turn is None and calibration is None:
         of, unit, factor = linear
-        values = timed if factor == 1.0 else factor * timed
-        return RunColumn(reading, values, unit, of, motion=DISPLACEMENT.motion)
+        values, codes = without_codes(timed)
+        values = values if factor == 1.0 else factor * values
+        return RunColumn(reading, values, unit, of, tuple(codes), motion=DISPLACEMENT.motion)
     kinds = ("angle", "counts", "voltage", "rate", "acceleration")
     unit = stated_unit(choices.unit, kinds, "--unit") or reading.unit
     if unit and kind_of(unit) not in kinds and choices.counts_per_turn is None and calibration is None:
@@ -199,12 +280,15 @@ def in_radians(
             where=where,
             remedy=f"give --unit ({', '.join(UNITS['angle'])} or another), --counts-per-turn N or --calibration",
         )
-    values, remarks = without_overflow(timed)
+    if choices.unit is None:
+        _refuse_rate(reading, where)
+    values, remarks = _continuous(timed, choices.counts_per_turn or _turn_in(unit))
     if not np.isfinite(values).any():
         what = f"{reading.quoted} holds no number where the file states a time"
         raise TunnelError(what, where=where, remedy="leave the file out, or name another column by --angle")
     if calibration is not None:
-        volts = values * UNITS["voltage"].get(unit, 1.0)
+        own = unit if kind_of(unit) == "voltage" else reading.unit
+        volts = values * UNITS["voltage"].get(own, 1.0)
         first, second = calibration
         if isinstance(first, float):
             values = first + second * volts
@@ -218,6 +302,8 @@ def in_radians(
             values = np.interp(volts, first, second)
         unit = unit if kind_of(unit) == "angle" else ""
         remarks.append(f"'{reading.name}' converted by the calibration")
+        values, overflowed = without_overflow(values, _turn_in(unit))
+        remarks += overflowed
     elif choices.counts_per_turn is not None:
         values, unit = values / choices.counts_per_turn, "turns"
         remarks.append(f"'{reading.name}' holds counts, {choices.counts_per_turn:g} per turn")
@@ -245,7 +331,7 @@ def in_radians(
     factor = UNITS[kind][unit]
     quantity: Quantity = "rate" if kind == "rate" else "acceleration" if kind == "acceleration" else "angle"
     values = values if factor == 1.0 else values * factor
-    swing = 0.5 * float(np.nanmax(values) - np.nanmin(values))
+    swing = _swing(values)
     # a disc between springs swings as far, but counts look like degrees
     if unit == "deg" and choices.unit is None and calibration is None and swing > _HALF_TURN:
         what = f"{reading.quoted} would swing by more than half a turn in degrees"

@@ -39,7 +39,7 @@ from tunnel_sim.files.importing.inputs import (
 )
 from tunnel_sim.files.importing.remarks import doubt
 from tunnel_sim.files.importing.tables import NO_CHANNEL, Channel, RunColumn, Table, is_input
-from tunnel_sim.files.importing.units import claims, kind_of
+from tunnel_sim.files.importing.units import UNITS, claims, kind_of, unit_after_word
 from tunnel_sim.vocabulary.errors import TunnelError, asking, attempt, did_you_mean, joined, one_line
 from tunnel_sim.vocabulary.freedom import DISPLACEMENT, FREEDOMS, column_unit, freedom_of_column, linear_unit
 from tunnel_sim.vocabulary.input_kinds import without_command
@@ -124,6 +124,8 @@ def _as_numbers(
     # A row without a time is not a sample: a heading between two runs may hold other numbers.
     timed = channel.values if time is None else np.where(np.isfinite(time.values), channel.values, np.nan)
     reading = attempt(faults, lambda: in_radians(channel, timed, choices, calibration, where))
+    if reading is not None and not channel.unit and choices.unit is None and calibration is None:
+        attempt(faults, partial(_refuse_other_unit, reading, table, where))
     driven = None
     if reading is not None:
         driven = attempt(faults, partial(find_input, table.channels, clock, reading, choices, where))
@@ -138,6 +140,16 @@ def _as_numbers(
             remarks.append(f"{driven.channel.quoted} has no sample at {outside.sum()} of {rows}: left out")
             reading = replace(reading, values=np.where(outside, np.nan, reading.values))
     return RunColumns(run.run, time, reading, driven, tuple(remarks))
+
+
+def _refuse_other_unit(reading: RunColumn, table: Table, where: str) -> None:
+    """Refuse a guessed unit of an angle beside a text that states another one."""
+    for name, text in table.texts.items():
+        line = text if name.startswith("line ") else f"{name.rpartition('/')[2]}: {text}"
+        unit = unit_after_word(line)
+        if unit is not None and kind_of(unit) == "angle" and unit != reading.unit:
+            what = f"'{one_line(line, 40)}' may state the unit of {reading.channel.quoted}"
+            raise asking(f"--unit {unit}", what, where, f", or --unit {reading.unit}")
 
 
 def _unused(table: Table, columns: RunColumns, choices: ImportChoices) -> list[str]:
@@ -242,6 +254,7 @@ def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[RunColu
             time = _chosen(block, choices.time, "--time", where)[0]
         elif clocks:
             time = clocks[0]
+            _refuse_split_clock(clocks, where)
             if len(clocks) > 1:
                 which = f"times from '{time.name}', the first of {len(clocks)} columns of times"
                 remarks.append(doubt(f"{which}; --time names another"))
@@ -269,6 +282,20 @@ def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[RunColu
     if not pairs:
         _refuse_without_angle(table.channels, where)
     return pairs
+
+
+def _refuse_split_clock(clocks: Sequence[Channel], where: str) -> None:
+    """Refuse a clock of whole units beside a column of their fractions, such as seconds and milliseconds."""
+    first = clocks[0]
+    for other in clocks[1:]:
+        whole, part = (UNITS["time"].get(c.unit, 0.0) for c in (first, other))
+        known = np.isfinite(first.values) & np.isfinite(other.values)
+        stamps, rest = first.values[known], other.values[known] * part
+        within = 0.0 < part < whole and rest.size and rest.min() >= 0.0 and rest.max() < whole
+        if within and (stamps == np.round(stamps)).all() and (np.diff(stamps) == 0.0).any():
+            what = f"the times are in two columns, {listed((first, other))}"
+            remedy = f"write one column of times, or give --time, one of {listed((first, other))}"
+            raise TunnelError(what, where=where, remedy=remedy)
 
 
 def _pair(time: Channel, reading: Channel, run: str = "", said: tuple[str, ...] = ()) -> RunColumns:
@@ -313,7 +340,7 @@ def _readings(
             raise TunnelError(what, where=where, remedy=f"give --angle, one of {listed(measured)}")
         readings = own or _likeliest(others)[1]
     widest = {unit: max(_span(c) for c in readings if c.unit == unit) for unit in {c.unit for c in readings}}
-    still = [c for c in readings if _span(c) < _HARDLY * widest[c.unit]]
+    still = [c for c in readings if _span(c) < _HARDLY * widest[c.unit] and not _of_others(c, readings, time)]
     remarks = [f"'{stem(channel.name)}' is left out: it hardly moves" for channel in still]
     readings = [channel for channel in readings if channel not in still]
     while len(readings) > 1 and (rate := _a_rate(readings, time)) is not None:
@@ -373,6 +400,21 @@ def _span(channel: Channel) -> float:
     """Difference of the greatest and the least number."""
     numbers = channel.values[np.isfinite(channel.values)]
     return float(np.ptp(numbers)) if numbers.size else 0.0
+
+
+def _of_others(channel: Channel, channels: Sequence[Channel], time: Channel) -> bool:
+    """Whether a column without a unit is the motion of which another one is the rate or the acceleration."""
+    others = [c for c in channels if c is not channel and c.unit == "" and _span(c) > _span(channel)]
+    if channel.unit or time is NO_CHANNEL:
+        return False
+    for other in others:
+        values = np.stack([c.values[:_HEAD] for c in (channel, other)])
+        first, second = values[:, np.isfinite(values).all(axis=0)]
+        if first.size >= _LEAST_JUDGED and np.ptp(first) > 0.0 < np.ptp(second):
+            alike = (np.corrcoef(one, second)[0, 1] for one in (first, np.gradient(first)))
+            if max(map(abs, alike)) > _DERIVATIVE:
+                return True
+    return False
 
 
 def _a_rate(channels: Sequence[Channel], time: Channel) -> Channel | None:

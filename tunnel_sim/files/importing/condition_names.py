@@ -68,9 +68,15 @@ _LIKE = {
     ),
 }
 """Names without a unit that may mean a condition, or another quantity."""
+_UNKNOWN = {
+    "wind_speed": re.compile(r"(km|dm|cm|m|ft|in|inch|mi)(/|p)(s|sec|min|h|hr)"),
+    "spring_stiffness": re.compile(r".*[nfb].*/(rad|mrad|deg|°|grad|rev|turn|u)"),
+}
+"""Units of conditions that are not among `UNITS`."""
 _WINDY = re.compile(
     r"(?i)(?<![a-z])(wind|air|flow|free_?stream|tunnel|pitot|anemometer|prandtl|fan|blower|gebl[äa]se|str[öo]mung|"
-    r"luft|windkanal)(?![a-z])|(?<![a-z])(air|wind|flow|fan)_?(speed|spd|vel)|(?<![a-z])[uv]_?(inf|∞|mean|air|wind|"
+    r"luft|windkanal)(?![a-z])|(?<![a-z])(air|wind|flow|fan)_?(speed|spd|vel)|"
+    r"vitesse du vent|viento|vento|風速|风速|(?<![a-z])[uv]_?(inf|∞|mean|air|wind|"
     r"tunnel|ref|fs)(?![a-z])|(?<![a-z])(speed|velocity|geschwindigkeit)(?![a-z])"
 )
 """Words in a name that suggest a wind speed."""
@@ -130,15 +136,25 @@ def condition_of(name: str, unit: str, *, alone: bool = False) -> str | None:
 def resembles(name: str, unit: str) -> str | None:
     """The condition that a name without a unit, or a unit alone, suggests without stating it; None: none."""
     words = _JOINED.sub("_", name.strip())
-    if _DYNAMIC.search(words) and unit.lower() in _PRESSURES:
+    pressed = _DYNAMIC.search(words) or (unit and re.fullmatch(r"(?i)q(\s*\W.*)?", words))
+    if pressed and unit.lower() in _PRESSURES:
         return "wind_speed"
     if unit:
         found = next((key for key, kind in _KINDS.items() if kind == kind_of(unit) and kind != "angle"), None)
         fan = unit in ("rpm", "Hz", "%") and _FAN.search(words) is not None
+        if found is None and kind_of(unit) == "":  # an unknown unit of the same kind, such as cm/s
+            found = next((key for key in _UNKNOWN if in_unknown_unit(key, unit)), None)
+            plain = re.sub(r"\s*[(\[{<].*", "", words)
+            found = found if found and _LIKE[found].fullmatch(plain) else None
         return "wind_speed" if found is None and fan else found
     found = next((key for key, pattern in _LIKE.items() if pattern.fullmatch(words)), None)
     windy = found is None and _WINDY.search(words) is not None and _NOT_WINDY.search(words) is None
     return "wind_speed" if windy else found
+
+
+def in_unknown_unit(key: str, unit: str) -> bool:
+    """Whether a unit that is not among `UNITS` seems to measure a condition."""
+    return key in _UNKNOWN and kind_of(unit) == "" and _UNKNOWN[key].fullmatch(squeezed(unit)) is not None
 
 
 def in_si(key: str, unit: str) -> float | None:

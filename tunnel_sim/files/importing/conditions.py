@@ -20,6 +20,7 @@ from tunnel_sim.files.importing.condition_names import (
     Hint,
     condition_of,
     in_si,
+    in_unknown_unit,
     resembles,
     units_of,
 )
@@ -35,6 +36,7 @@ from tunnel_sim.vocabulary.freedom import ANGLE, Freedom
 
 _OFF = 0.5  # share of the range: the median of a wind speed that starts late is further from zero
 _EVEN = 1e-9  # share of a value: a column that varies less is constant
+_ALIKE = 1e-6  # share of a value: two statements that differ by less agree, such as 10 m/s and 36 km/h
 _IN_TABLE = ("wind_speed", "spring_stiffness")  # columns of the table of runs
 _LISTED = 10  # number of statements of a file that a remark lists
 
@@ -132,7 +134,8 @@ def _unused_statements(table: Table, claimed: Mapping[str, str], freedom: Freedo
             claims(text, name, unit) for text in claimed.values()
         )
         if not (used or heading in INPUT_FACTS or describes_samples(heading) or resembles(name, unit)):
-            found.append(f"{one_line(heading, 40)} = {value:g}")
+            number = f"{value:g}" if np.isfinite(value) else "several numbers"
+            found.append(f"{one_line(heading, 40)} = {number}")
     found += [f"{one_line(name, 40)}: '{one_line(text, 60)}'" for name, text in table.texts.items()]
     more = f" and {len(found) - _LISTED} more" if len(found) > _LISTED else ""
     return [f"stated in the file and not used: {', '.join(found[:_LISTED])}{more}"] if found else []
@@ -164,6 +167,7 @@ def _from_facts(
     """
     conditions: dict[str, float] = {}
     names: dict[str, str] = {}
+    contested: dict[str, Hint] = {}
     hints = []
     for heading, value in facts.items():
         name, unit = split_unit(heading)
@@ -173,14 +177,22 @@ def _from_facts(
         key, value = key or condition_of(name, unit, alone=True), own * value
         if (key or resembles(name, unit)) in freedom.refused:
             continue
-        if key is not None and (factor := in_si(key, unit)) is not None:
+        if key is not None and not np.isfinite(value):
+            hints.append(_hint_of_several(name, key))
+        elif key is not None and (factor := in_si(key, unit)) is not None:
+            number = float(value) * factor
             if sure or names.get(key) not in claimed.values():
-                conditions[key], names[key] = float(value) * factor, name
+                if not sure and abs(conditions.get(key, number) - number) > _ALIKE * abs(number):
+                    contested[key] = _hint_of_several(f"{names[key]}', '{name}", key)
+                conditions[key], names[key] = number, name
         elif sure:
             what = f"'{one_line(heading, 60)}' is not in a unit of {key} ({units_of(key or '')})"
             raise asking(f"--set {key}=NUMBER", what, where)
         elif hint := _hint(name, unit, key, float(value)):
             hints.append(hint)
+    for key in [key for key in contested if names[key] not in claimed.values()]:
+        hints.append(contested[key])
+        del conditions[key], names[key]
     symbols = [hint for hint in hints if hint.key == "wind_speed" and np.isfinite(hint.value)]
     # a density is stated for the wind only, so a single symbol of a speed beside it means the wind
     if "air_density" in conditions and "wind_speed" not in conditions and len(symbols) == 1:
@@ -201,6 +213,8 @@ def _hint(name: str, unit: str, key: str | None, value: float) -> Hint | None:
     """The hint of an unused column or number; ``key``: the condition stated by its name."""
     shown_name = one_line(name, 60)
     number = "" if np.isnan(value) else f" = {value:g}"
+    if key is None and (like := resembles(name, unit)) is not None and in_unknown_unit(like, unit):
+        key = like
     if key is not None:
         why = f"its unit is not one of {units_of(key)}"
         what = (
@@ -229,6 +243,13 @@ def _hint(name: str, unit: str, key: str | None, value: float) -> Hint | None:
     else:
         what, why = f"'{shown_name}'{number}", f"it may be {key}, but has no unit"
     return Hint(key, value, what, why, use, option=option)
+
+
+def _hint_of_several(name: str, key: str) -> Hint:
+    """The hint of a name for which a file states several numbers."""
+    why = "the file states several numbers"
+    use = f"--conditions RUNS.csv states it run by run, --set {key}=NUMBER for all runs"
+    return Hint(key, float("nan"), f"'{one_line(name, 60)}'", why, use)
 
 
 def _from_column(

@@ -151,7 +151,7 @@ def _records(
     driven = columns.input
     time, readings = columns.time.values[kept], columns.reading.values[kept]
     facts = {key: value for key in INPUT_FACTS if np.isfinite(value := table.facts.get(key, np.nan))}
-    starts = [0, *restarts(time), time.size]
+    starts = [0, *restarts(time, readings), time.size]
     if len(starts) > 2:
         remarks.append(f"the clock restarts {counted(len(starts) - 2, 'time')}: a new run each time")
     for place, (a, b) in enumerate(itertools.pairwise(starts), 1):

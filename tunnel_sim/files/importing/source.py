@@ -54,7 +54,7 @@ def _read(request: dict[str, Any], contents: list[bytes]) -> Message:
         tables = pkgutil.resolve_name(request["reader"]).read_tables(content, where)
     described = [
         {field.name: getattr(table, field.name) for field in fields(Table)}
-        | {"channels": [(channel.name, channel.unit, channel.place) for channel in table.channels]}
+        | {"channels": [(c.name, c.unit, c.place, c.fault) for c in table.channels]}
         for table in tables
     ]
     columns = [np.ascontiguousarray(c.values, np.float64) for table in tables for c in table.channels]

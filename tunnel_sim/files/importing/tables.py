@@ -40,12 +40,14 @@ class Channel:
         values: values in the unit of the file; NaN for a missing number.
         unit: one of `units.UNITS`, another text, or empty if none is stated.
         place: number of the column in the file, from 1 on; 0 if the file does not number its columns.
+        fault: why its numbers are not those of one record, and the remedy; empty: they are, as far as is known.
     """
 
     name: str
     values: Rows
     unit: str = ""
     place: int = 0
+    fault: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Make every NaN quiet: a damaged file may contain signalling ones, which turn a minimum into NaN.

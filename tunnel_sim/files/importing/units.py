@@ -22,7 +22,7 @@ UNITS: Mapping[str, Mapping[str, float]] = {
 """Factors to s, rad, counts, V, rad/s, rad/s², m/s, N m/rad and kg/m³, by kind of quantity and unit."""
 
 _WORDS = {
-    "s": "s sec secs second seconds sek sekunde sekunden",
+    "s": "s sec secs second seconds sek sekunde sekunden 秒",
     "ms": "ms msec millisecond milliseconds millis millisekunde millisekunden",
     "us": "us usec microsecond microseconds micros mikrosekunde mikrosekunden",
     "ns": "ns nanoseconds nanosekunden",
@@ -30,7 +30,7 @@ _WORDS = {
     "h": "h hr hour hours std stunde stunden",
     "rad": "rad rads radian radians radiant bogenmaß bogenmass",
     "mrad": "mrad milliradian milliradians millirad",
-    "deg": "deg degs degree degrees ° â° altgrad winkelgrad",
+    "deg": "deg degs degree degrees ° â° altgrad winkelgrad degré degrés degre degres grado grados gradi 度",
     "gon": "gon neugrad gradian gradians",
     "turns": "turn turns rev revs revolution revolutions umdr umdrehung umdrehungen",
     "counts": "count counts cts ticks pulse pulses lsb digit digits ink inkr inkrement inkremente incr increment "
@@ -77,6 +77,7 @@ _RUN = r"(?:run|trial|test|swing|rep|versuch|messung|lauf)"
 _OF_RUN = re.compile(rf"(?i)[\s_]+{_RUN}[\s_#.-]*\d+\s*$")
 _LIKE_A_UNIT = re.compile(rf"(?!(?i:{_RUN})$)(?:[^\W\d_]|[°%])+(?:[.^/·*-]*[^\W\d_])*\^?-?[23²³]?")
 _TEMPERATURE = re.compile(r"(?i)temperat|(?<![a-z])temp(?![a-z])")
+_UNIT_WORD = re.compile(r"(?i)(?:unit|einheit)(?:s|en)?\W+([^\s,;:=]+)\W*$")
 _LONGEST = 10  # characters: a longer word is not a unit
 
 
@@ -130,6 +131,12 @@ def _bare(name: str) -> str:
     return re.sub(r"\s*[(\[{<](?!\d+[)\]}>]).*", "", name)
 
 
+def unit_after_word(text: str) -> str | None:
+    """The known unit in a text such as ``angle_unit: deg``; None if there is none."""
+    found = _UNIT_WORD.search(text)
+    return None if found is None else known_unit(found[1])
+
+
 def unit_beside(name: str, text: str) -> str:
     """The unit stated by a cell below a name; as written if it is not known."""
     return known_unit(_in_german(name, text)) or text.strip("()[]{} -")
@@ -168,7 +175,7 @@ def _split(heading: str) -> tuple[str, str]:
     bracket = _BRACKETS.search(heading)
     if bracket is not None:  # a heading that ends in a bracket, such as "[kN/s]", does not end in a unit
         return heading, "" if bracket.start() == 0 or bracket[1].isdigit() else bracket[1]
-    for split in (_after_in, _after_separator, _after_slash):
+    for split in (_after_in, _after_separator, _after_slash, _after_joined):
         parts = split(heading)
         if parts is not None:
             return parts
@@ -205,6 +212,15 @@ def _after_separator(heading: str) -> tuple[str, str] | None:
     if heading.endswith("°") and heading[:-1].strip():
         return heading[:-1].strip(), "deg"
     return None
+
+
+def _after_joined(heading: str) -> tuple[str, str] | None:
+    """``timeMs`` or ``angleDeg``: a known unit as the last of words that are joined."""
+    word = re.split(r"(?<=[a-z])(?=[A-Z])", heading)[-1]
+    unit = known_unit(word)
+    if word == heading or kind_of(unit or "") not in ("time", "angle", "rate") or unit in _AMBIGUOUS:
+        return None
+    return heading[: -len(word)], unit or ""
 
 
 def _after_slash(heading: str) -> tuple[str, str] | None:

@@ -70,10 +70,18 @@ def test_a_unit_for_one_of_several_columns_takes_that_one(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    ("step", "unit"), [(0.001, "s"), (0.5, "s"), (1.0, "ms"), (500.0, "ms"), (1000.0, "us")]
+    ("step", "unit"),
+    [(0.001, "s"), (0.5, "s"), (1.0, "ms"), (500.0, "ms"), (1000.0, "us"), (5e5, "us"), (1e7, "ns")],
 )
 def test_times_without_a_unit(step: float, unit: str) -> None:
     assert guessed_time_unit(step * np.arange(20.0)) == (unit, pytest.approx(step))
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)])
+@pytest.mark.parametrize("rate", [100.0, 5000.0])
+def test_times_since_1970_show_their_unit(unit: str, factor: float, rate: float) -> None:
+    stamps = (1716300000.0 + np.arange(200.0) / rate) / factor
+    assert guessed_time_unit(stamps)[0] == unit
 
 
 @pytest.mark.parametrize(("swing", "unit"), [(3.1, "rad"), (3.2, "deg")])

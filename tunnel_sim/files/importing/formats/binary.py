@@ -13,7 +13,7 @@ import polars as pl
 from numpy.typing import NDArray
 
 from tunnel_sim.files.importing.formats.arrays import RUN_IDS, check_size, tables_of_arrays
-from tunnel_sim.files.importing.formats.text import facts_in
+from tunnel_sim.files.importing.formats.layout import facts_in
 from tunnel_sim.files.importing.formats.waveforms import Waveform, aligned_tables
 from tunnel_sim.files.importing.tables import Channel, Table, by_texts, hold_order, names_runs
 from tunnel_sim.files.importing.units import known_unit, split_unit
@@ -68,6 +68,7 @@ def _read_tables(content: bytes, where: str) -> list[Table]:
 
 
 PARQUET = Reader("a Parquet file", limits.DATA_BYTES, (b"PAR1",), _read_run, _read_tables, run_apart=True)
+_PACKING = ("scale_factor", "add_offset", "_FillValue")
 _COMPRESSED = 15  # data type of an element compressed by zlib
 _HEADER = 128  # bytes before the first element of version 5
 
@@ -117,9 +118,22 @@ def _read_hdf5(content: bytes, where: str) -> list[Table]:
                 table = item[()]
                 arrays |= {f"{path}/{name}": table[name] for name in item.dtype.names}
             elif item.dtype.kind in "iufb":
-                arrays[path] = item[()]
+                arrays[path] = _unpacked(item)
         units = {path: _hdf5_unit(item) for path, item in datasets.items() if _hdf5_unit(item)}
     return tables_of_arrays(arrays, "HDF5 file", units, runs, texts)
+
+
+def _unpacked(item: Any) -> NDArray[np.generic]:
+    """The numbers of a dataset, by the attributes with which netCDF packs them into integers."""
+    numbers: NDArray[np.generic] = item[()]
+    stated = {name: np.asarray(item.attrs[name]) for name in _PACKING if name in item.attrs}
+    stated = {name: value.reshape(-1)[0] for name, value in stated.items() if value.dtype.kind in "iuf"}
+    if not stated:
+        return numbers
+    values = numbers.astype(np.float64)
+    if "_FillValue" in stated:
+        values[numbers == stated["_FillValue"]] = np.nan
+    return values * stated.get("scale_factor", 1.0) + stated.get("add_offset", 0.0)
 
 
 def _hdf5_unit(item: Any) -> str:

@@ -12,7 +12,8 @@ import polars as pl
 from numpy.typing import NDArray
 
 from tunnel_sim.files.importing.formats.arrays import RUN_IDS, check_size, tables_of_arrays
-from tunnel_sim.files.importing.formats.text import Layout, facts_in, tables_of
+from tunnel_sim.files.importing.formats.layout import Layout, facts_in
+from tunnel_sim.files.importing.formats.text import tables_of
 from tunnel_sim.files.importing.tables import LEAST_ROWS, Table, by_texts, hold_order, names_runs
 from tunnel_sim.files.importing.units import kind_of, known_unit, names_a_time, split_unit
 from tunnel_sim.files.readers import Reader, faults

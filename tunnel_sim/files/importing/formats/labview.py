@@ -10,16 +10,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from tunnel_sim.files.importing.formats.text import (
-    Dialect,
-    Layout,
-    as_utf8,
-    check_table,
-    distinct,
-    facts_in,
-    frame_of,
-    tables_of,
-)
+from tunnel_sim.files.importing.formats.layout import Layout, distinct, facts_in
+from tunnel_sim.files.importing.formats.text import Dialect, as_utf8, check_table, frame_of, tables_of
 from tunnel_sim.files.importing.formats.waveforms import Waveform, aligned_tables
 from tunnel_sim.files.importing.tables import Channel, Table
 from tunnel_sim.files.importing.units import known_unit, split_unit

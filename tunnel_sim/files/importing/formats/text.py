@@ -4,219 +4,54 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import polars as pl
 
 from tunnel_sim.files.importing.choices import ImportChoices
-from tunnel_sim.files.importing.condition_names import mentions_wind
-from tunnel_sim.files.importing.tables import Channel, Table, by_texts, hold_order, names_runs
-from tunnel_sim.files.importing.units import UNITS, kind_of, known_unit, split_unit, unit_beside
+from tunnel_sim.files.importing.condition_names import condition_of, mentions_wind
+from tunnel_sim.files.importing.formats.cells import (
+    MISSING,
+    as_numbers,
+    in_parts,
+    is_missing,
+    is_number,
+    like_number,
+    seconds_of_day,
+    series_by,
+    unread_in,
+    without_short_tables,
+    without_thousands,
+)
+from tunnel_sim.files.importing.formats.layout import (
+    LONGEST_LINE,
+    Layout,
+    changed_columns,
+    facts_in,
+    find_layout,
+)
+from tunnel_sim.files.importing.tables import LEAST_ROWS, Channel, Table, by_texts, hold_order
+from tunnel_sim.files.importing.units import kind_of, names_a_time, split_unit, unit_after_word
 from tunnel_sim.files.readers import Reader
 from tunnel_sim.files.reading import check_count, check_lines, check_utf8, read_regular
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, counted, one_line, shown
 
-MISSING = ("", "nan", "-nan", "#n/a", "n/a", "na", "null", "none", "-", "--", "inf", "-inf", "#num!")
-"""Texts, in lower case, that stand for a missing number."""
-_NUMBER = {
-    ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"),
-    ",": re.compile(r"[+-]?(\d+(,\d+)?|,\d+)([eE][+-]?\d+)?"),
-}
-_FACT = re.compile(
-    r"(?:^|[,;|\t])\W*([^\W\d_](?:[^\d:=,;\t]|(?<=[^\W_])\d|(?<=\^)-?\d)*?)\s*[:=,;\t]\s*"
-    r"(?:([^\s\d:=,;\t|][^:=,;\t|]{0,14}?)\s*[;,\t]\s*)?([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)"
-    r"(?!\d|[.:/-]\d) *([;,\t]? *[^\s\d;,\t|=:][^;,\t|=:]*(?![^;,\t|]))?"
-)
-"""A name, perhaps a cell with its unit, a number, and its unit, perhaps in the next cell; not a date or time."""
-_HERTZ = {"hz": 1.0, "khz": 1e3, "mhz": 1e6}
-_SI = {kind: next(unit for unit, factor in units.items() if factor == 1.0) for kind, units in UNITS.items()}
-_AXIS = re.compile(r"(?i)\W*(horizontal|vertical) units?\s*[,:;=\t]\s*(.+)$")
-_COUNTS = ("sequence", "points")  # beside units: the column counts samples
-_LONG_UNIT = 8  # characters: a longer text is a name
-
-
-def is_number(text: str, decimal: str = ".") -> bool:
-    """Whether a text is a number."""
-    return _NUMBER[decimal].fullmatch(text) is not None
-
-
-def is_missing(text: str) -> bool:
-    """Whether a text stands for a missing number."""
-    return text.lower() in MISSING
-
-
-@dataclass(frozen=True)
-class Layout:
-    """The head of a sheet: its first row of numbers, its columns, and numbers stated above, in SI units.
-
-    Args:
-        beside: indices of columns that hold the header of others, as in the files of some oscilloscopes.
-    """
-
-    first: int
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    headed: bool
-    facts: Mapping[str, float]
-    beside: tuple[int, ...] = ()
-
-    @property
-    def runs(self) -> int | None:
-        """Index of the column that gives the run of a row."""
-        columns = enumerate(zip(self.names, self.units, strict=True))
-        return next((i for i, (name, unit) in columns if names_runs(name) and not unit), None)
-
-
-def facts_in(lines: Sequence[str]) -> dict[str, float]:
-    """Numbers stated in lines, such as ``Sample rate: 1000 Hz`` or ``V = 54 km/h``, by name and unit.
-
-    Returns:
-        Values in SI units if the unit is known; the name then ends with it in brackets.
-    """
-    facts = {}
-    for line in (line.replace('"', "") for line in lines if len(line) <= _LONG_LINE):
-        for name, before, number, behind in _FACT.findall(line):
-            name = name.strip()
-            if before and known_unit(before) is None:  # a cell with the name, after a heading
-                name, before = before, ""
-            text = (before or behind.lstrip(";,\t ")).strip("()[] ")
-            unit, value = known_unit(text), float(number.replace(",", "."))
-            if unit is not None:
-                text, value = _SI[kind_of(unit)], value * UNITS[kind_of(unit)][unit]
-            elif text.lower() in _HERTZ:
-                text, value = "", value * _HERTZ[text.lower()]
-            facts[f"{name} ({text})" if text else name] = value
-    return facts
-
-
-def find_layout(
-    rows: Sequence[Sequence[str]], lines: Sequence[str], decimal: str, width: int
-) -> Layout | None:
-    """Names, units and the first row of numbers of a sheet, given the cells and lines of its head; or None."""
-    tail = [row for row in rows[len(rows) // 2 :] if any(cell for cell in row)]
-    numeric = [
-        column
-        for column in range(width)
-        if 2 * sum(column < len(row) and is_number(row[column], decimal) for row in tail) > len(tail)
-    ]
-
-    def is_data(row: Sequence[str]) -> bool:
-        cells = [row[column] if column < len(row) else "" for column in numeric]
-        filled = sum(is_number(cell, decimal) for cell in cells)
-        return filled > 0 and all(is_number(cell, decimal) or is_missing(cell) for cell in cells)
-
-    first = next((i for i in range(len(rows)) if all(map(is_data, rows[i : i + 3]))), None)
-    if first is None:
-        return None
-    above = []  # the rows that may name every column
-    for index, row in enumerate(rows[:first]):
-        cells = [cell.strip().strip('"').strip() for cell in row]
-        if cells:
-            cells[0] = cells[0].lstrip("#%!*/;").strip()
-        while len(cells) > width and not cells[-1]:
-            cells.pop()
-        texts = [cell for cell in cells if cell and not is_number(cell, decimal)]
-        if len(cells) <= width and 2 * len(texts) >= width and (width <= 1 or len(texts) > 1):
-            above.append((index, cells + [""] * (width - len(cells))))
-    units, numbers = _units_row(above, width, decimal)
-    names = list(above[-1][1]) if above else []
-    split = [split_unit(name) for name in names]
-    named = [name or f"column {i + 1}" for i, (name, _) in enumerate(split)]
-    stated = list(lines[: above[-1][0] if above else first])
-    beside: tuple[int, ...] = ()
-    if not names:
-        beside, found = _beside(rows, numeric)
-        stated += found
-    given = [one or own for (_, one), own in zip(split or [("", "")] * width, units, strict=True)]
-    return Layout(
-        first,
-        tuple(distinct(named)) or tuple(f"column {i + 1}" for i in range(width)),
-        tuple(_of_scope(stated, given, numeric)),
-        bool(names),
-        facts_in(stated) | numbers,
-        beside,
-    )
-
-
-def _units_row(
-    above: list[tuple[int, list[str]]], width: int, decimal: str
-) -> tuple[list[str], dict[str, float]]:
-    """The units in the last of the rows that may name columns, and numbers there; it is removed if it states them.
-
-    Known units, or others in brackets; or more known units than short texts. Numbers stand below their names.
-    """
-    units = [""] * width
-    stated = [cell for cell in above[-1][1] if cell.strip("-")] if len(above) > 1 else []
-    numbers = [cell for cell in stated if is_number(cell, decimal)]
-    stated = [cell for cell in stated if cell not in numbers and cell.lower() not in _COUNTS]
-    known = [cell for cell in stated if known_unit(cell) is not None]
-    bare = [cell for cell in stated if cell not in known and not re.fullmatch(r"[\[({].*[\])}]", cell)]
-    few = len(known) > len(bare) and all(len(cell) <= _LONG_UNIT for cell in bare)
-    if not known or (bare and not few):
-        return units, {}
-    beside = above.pop()[1]
-    pairs = list(zip(above[-1][1], beside, strict=True))
-    facts = {name: float(cell.replace(",", ".")) for name, cell in pairs if name and cell in numbers}
-    return ["" if cell in numbers else unit_beside(name, cell) for name, cell in pairs], facts
-
-
-def _beside(rows: Sequence[Sequence[str]], numeric: Sequence[int]) -> tuple[tuple[int, ...], list[str]]:
-    """Columns that hold a header beside the first rows of numbers, and their lines; empty: there are none."""
-    columns = [i for i in range(numeric[-1]) if i not in numeric]
-    blocks = [[i for i in columns if i < end] for end in (i for i in numeric if i - 1 in columns)]
-    found: list[int] = []
-    lines = []
-    for block in blocks:
-        block = [i for i in block if i not in found]
-        texts = [[row[i].strip() for i in block if i < len(row)] for row in rows]
-        filled = [index for index, cells in enumerate(texts) if any(cells)]
-        pairs = [cells for cells in texts if len(cells) > 1 and cells[0] and any(cells[1:])]
-        if filled and 2 * filled[-1] < len(rows) and 2 * len(pairs) >= len(filled):
-            lines += [",".join(filter(None, cells)) for cells in pairs]
-            found += block
-    return tuple(found), lines
-
-
-def _of_scope(lines: Sequence[str], units: Sequence[str], numeric: Sequence[int]) -> list[str]:
-    """The units of columns; if they have none, from an oscilloscope's statements for both axes."""
-    stated: dict[str, list[str]] = {}
-    for line in lines:
-        found = _AXIS.match(line.replace('"', ""))
-        if found is not None:
-            cells = [cell.strip() for cell in re.split(r"[,;\t]", found[2]) if cell.strip()]
-            stated.setdefault(found[1].lower(), []).extend(cells)
-    result = list(units)
-    if not {"horizontal", "vertical"} <= set(stated) or any(units[i] for i in numeric):
-        return result
-    after = 0
-    for column in numeric:
-        first = column - 1 not in numeric and column + 1 in numeric  # of a block: the times
-        cells = stated["horizontal"] if first else stated["vertical"]
-        text = cells[0] if first else cells[min(after, len(cells) - 1)] if cells else ""
-        after += not first
-        result[column] = known_unit(text) or text
-    return result
-
-
-def distinct(names: Sequence[str]) -> list[str]:
-    """Names of columns, with the position added to an ambiguous name."""
-    counts = Counter(names)
-    return [name if counts[name] == 1 else f"{name} #{i + 1}" for i, name in enumerate(names)]
-
-
 TEXT = Reader("a table of text", limits.CSV_BYTES)
 """Any file without a reader of its own; `read_text_tables` takes known properties of its dialect."""
-_CLOCK = r"(?:^|[ T])(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?)(?:\s*([AaPp])\.?[Mm]\.?|Z|[+-]\d{2}:?\d{2})?$"
 _DAY = 86400.0  # s
 _HEAD, _MIDDLE = 2**18, 2**14  # number of inspected bytes
+_MINUS = re.compile("(?:\N{MINUS SIGN}|\N{EN DASH})(?=[0-9.,])".encode())
+"""A minus that programs write as in print."""
+_OF_SERIES = re.compile(r"(?i)variable|signal|channel|quantity|metric|topic|kanal|mess?gr(ö|oe)(ß|ss)e")
+"""Names of a column that gives the quantity of each row."""
+_MOST_BELOW = 1000  # number of inspected lines of texts below the first row of numbers
 _LOOKED_AT = 1000  # number of texts of a column that show whether they are times of day
-_PART = 2**20  # number of texts converted at once
-_LONG_LINE = 1000  # characters: a longer line above a table does not state a number
 _HEAD_LINES = 400
 _NAMES = {"tab": "\t", ";": ";", ",": ",", "|": "|", "blank": " "}
 _SAID = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars", " ": "blanks"}
@@ -233,10 +68,10 @@ class Dialect:
     def split(self, line: str) -> list[str]:
         """The cells of a line, without blanks and quotes around them."""
         if self.delimiter == " ":
-            return line.split()
-        cells = re.findall(
-            rf'(?:^|{re.escape(self.delimiter)})("[^"]*"|[^{re.escape(self.delimiter)}]*)', line
-        )
+            cells = re.findall(r'"[^"]*"(?!\S)|\S+', line)
+        else:
+            sign = re.escape(self.delimiter)
+            cells = re.findall(rf'(?:^|{sign})([ \t]*"[^"]*"[ \t]*(?={sign}|$)|[^{sign}]*)', line)
         return [cell.strip(' \t"') for cell in cells]
 
 
@@ -251,6 +86,9 @@ def read_text_tables(
         "give the file the ending of its format (.xlsx, .mat, .tdms, .h5, .parquet), or save it again as text"
     )
     check_lines(content, where, nul)
+    content = _without_doubled_ends(content)
+    if not content.isascii():
+        content = _MINUS.sub(b"-", content)
     head = content[:_HEAD].decode(errors="replace").splitlines()
     if len(content) > _HEAD:
         head.pop()
@@ -263,6 +101,9 @@ def read_text_tables(
         remedy = "give --delimiter and --decimal, or name a table"
         raise TunnelError("no columns of numbers", where=where, remedy=remedy)
     check_table(content, dialect.width, where)
+    if _has_halves(body, dialect):
+        what = "commas separate the columns, and are decimal signs as well"
+        raise TunnelError(what, where=where, remedy="export it with semicolons or with decimal points")
     layout = find_layout([_cells(line, dialect) for line in head], head, dialect.decimal, dialect.width)
     sample = [dialect.split(line) for line in body if line.strip()]
     if layout is None:
@@ -288,10 +129,28 @@ def read_text_tables(
     texts = {
         f"line {i}": line.strip()
         for i, line in enumerate(head[: layout.first], 1)
-        if len(line) <= _LONG_LINE and mentions_wind(line) and not facts_in([line])
+        if len(line) <= LONGEST_LINE
+        and (mentions_wind(line) or unit_after_word(line) is not None)
+        and not facts_in([line])
     }
-    table = Table((), remarks=(remark,), facts=layout.facts, texts=texts)
+    below = _texts_below(content, layout.first)
+    table = Table((), remarks=(remark,), facts=contested(layout.facts, below), texts=texts)
     return tables_of(frame, layout, dialect.decimal, labels, table), known
+
+
+def _texts_below(content: bytes, first: int) -> list[str]:
+    """Some lines of texts below the first row of numbers."""
+    found = re.compile(rb"(?m)^[^\w\n]*[A-Za-z\x80-\xff][^\n]*").finditer(content, _start_of(content, first))
+    return [line[0].decode(errors="replace") for line in islice(found, _MOST_BELOW)]
+
+
+def contested(facts: Mapping[str, float], below: Sequence[str]) -> dict[str, float]:
+    """Numbers above a table; NaN for a condition of which lines between its rows state another one."""
+    stated = dict(facts)
+    for heading, value in facts_in(below).items():
+        if condition_of(*split_unit(heading), alone=True) is not None and stated.get(heading) != value:
+            stated[heading] = float("nan")
+    return stated
 
 
 def check_table(content: bytes, width: int, where: str) -> None:
@@ -328,9 +187,12 @@ def frame_of(
     try:
         if at is not None:
             return pl.read_csv(content, schema=all_texts, columns=[at], **options)
-        kinds = {name: pl.String if i in texts else pl.Float64 for i, name in enumerate(names)}
+        # where commas are decimal, points may separate thousands: each column shows whether they do
+        quoted = dialect.delimiter == dialect.decimal
+        exact = quoted or (dialect.decimal == "," and _has_points(content, layout.first))
+        kinds = {name: pl.String if exact or i in texts else pl.Float64 for i, name in enumerate(names)}
         numbers = {**options, "decimal_comma": dialect.decimal == ","}
-        if not set(texts) - {layout.runs}:  # a text may contain delimiters in quotes
+        if not (quoted or set(texts) - {layout.runs}):  # a text may contain delimiters in quotes
             numbers["quote_char"] = None
         try:
             return pl.read_csv(content, schema=kinds, null_values=missing, **numbers)
@@ -339,6 +201,19 @@ def frame_of(
     except pl.exceptions.PolarsError as error:
         what = f"not a table of text ({one_line(error, 60)})"
         raise TunnelError(what, where=where, remedy="give every line one value for each column") from None
+
+
+def _has_points(content: bytes, first: int) -> bool:
+    """Whether a table has a point in a row of numbers, the first of which is given."""
+    return content.find(b".", _start_of(content, first)) >= 0
+
+
+def _start_of(content: bytes, line: int) -> int:
+    """The place at which a line begins."""
+    start = 0
+    for _ in range(line):
+        start = content.find(b"\n", start) + 1
+    return start
 
 
 def _cells(line: str, dialect: Dialect) -> list[str]:
@@ -365,15 +240,37 @@ def find_dialect(body: Sequence[str], choices: ImportChoices) -> Dialect | None:
     best, score = None, (0.2, 0)
     for delimiter in delimiters:
         for decimal in decimals:
-            if delimiter == "," == decimal:
+            if delimiter == "," == decimal and not any('"' in line for line in body):
                 continue
             rows = [Dialect(delimiter, decimal, 0).split(line) for line in body]
             width = Counter(len(row) for row in rows).most_common(1)[0][0] if rows else 0
             cells = [cell for row in rows for cell in row if not is_missing(cell)]
-            share = sum(is_number(cell, decimal) for cell in cells) / max(len(cells), 1)
+            share = sum(like_number(cell, decimal) for cell in cells) / max(len(cells), 1)
             if (round(share, 1), width) > score:
                 best, score = Dialect(delimiter, decimal, width), (round(share, 1), width)
     return best
+
+
+def _without_doubled_ends(content: bytes) -> bytes:
+    """Lines without the blank line after each of them that doubled line ends make."""
+    content = content.replace(b"\r\r\n", b"\n")
+    blank = len(re.findall(rb"\n\r?(?=\n)", content))
+    return re.sub(rb"\n\r?(?=\n)", b"", content) if 5 * blank > 2 * content.count(b"\n") else content
+
+
+def _has_halves(body: Sequence[str], dialect: Dialect) -> bool:
+    """Whether the cells of lines are halves of numbers: whole numbers, then as many decimals in each line."""
+    rows = [row for row in map(dialect.split, body) if len(row) == dialect.width]
+    if dialect.delimiter != "," or dialect.width < 4 or dialect.width % 2 or len(rows) < LEAST_ROWS:
+        return False
+    columns = list(zip(*rows, strict=True))
+    decimals = [cell for column in columns[1::2] for cell in column]
+    return (
+        all(re.fullmatch(r"[+-]?\d+", cell) for column in columns[::2] for cell in column)
+        and all(cell.isdigit() for cell in decimals)
+        and all(len(set(map(len, column))) == 1 for column in columns[1::2])
+        and any(cell.startswith("0") and len(cell) > 1 for cell in decimals)
+    )
 
 
 def as_utf8(content: bytes, where: str) -> tuple[bytes, str]:
@@ -396,63 +293,82 @@ def as_utf8(content: bytes, where: str) -> tuple[bytes, str]:
 
 
 def tables_of(
-    frame: pl.DataFrame, layout: Layout, decimal: str, labels: pl.Series | None, table: Table
+    frame: pl.DataFrame,
+    layout: Layout,
+    decimal: str,
+    labels: pl.Series | None,
+    table: Table,
+    written: pl.DataFrame | None = None,
 ) -> list[Table]:
-    """The tables of a sheet with its columns of numbers or times of day: one, or one for each run of the labels."""
+    """The tables of a sheet with its columns of numbers or times of day: one, or one for each run of the labels.
+
+    Args:
+        written: the rows with all their texts; None: they are in the frame.
+    """
     channels, notes = [], {-1: table.remarks[0]}
+    texts: dict[str, pl.Series] = {}
+    written = frame if written is None else written
+    frame, headings, below = without_short_tables(frame, decimal, written)
+    faults = {}
+    for row in headings:
+        for i, cell in changed_columns(layout, written.row(row)).items():
+            what = f"has another heading below the first one, '{one_line(cell, 40)}'"
+            faults[i] = (what, "write each table into a file of its own")
     for i, (name, unit, column) in enumerate(
         zip(layout.names, layout.units, frame.get_columns(), strict=True)
     ):
         if i in layout.beside:
             continue
         number, lost = column, 0
+        fault: tuple[str, ...] = faults.get(i, ())
         if column.dtype == pl.String and name == "drive_hold":
             number = column.map_elements(hold_order, return_dtype=pl.Float64).fill_nan(None)
             lost = number.null_count() - column.null_count()
         elif column.dtype == pl.String:
-            number = _in_parts(column, partial(_as_numbers, decimal=decimal))
+            cells = without_thousands(column) if decimal == "," else column
+            number = in_parts(cells, partial(as_numbers, decimal=decimal))
             lost = number.null_count() - column.null_count()
         if lost and number.null_count() == column.len():
             notes[i] = f"the column '{name}' holds text and is left out"
-            some = _seconds(column.drop_nulls().head(_LOOKED_AT))
+            some = seconds_of_day(column.drop_nulls().head(_LOOKED_AT))
             if 2 * some.null_count() <= some.len():
-                seconds = _in_parts(column, _seconds)
+                seconds = in_parts(column, seconds_of_day)
                 midnights = (seconds.forward_fill().diff() < -_DAY / 2).fill_null(value=False).cum_sum()
                 number, unit = seconds + _DAY * midnights, "s"
                 notes[i] = f"the column '{name}' holds times of day, taken as seconds"
         elif lost:
             notes[i] = f"{counted(lost, 'text')} in the column '{name}' taken as missing"
+            fault = fault or unread_in(column, number)
         if number.null_count() < number.len():
-            channels.append(Channel(name, number.fill_null(float("nan")).to_numpy(), unit, i + 1))
+            channels.append(Channel(name, number.fill_null(float("nan")).to_numpy(), unit, i + 1, fault))
+        elif column.dtype == pl.String:
+            texts[name] = column
+    channels = [_with_series(channel, texts) for channel in channels]
     table = replace(table, channels=tuple(channels), headed=layout.headed)
     tables = [table]
     if labels is not None and layout.runs is not None and labels.len() == frame.height:
         tables = by_texts(table, layout.names[layout.runs], labels)
     said = tuple(note for i, note in notes.items() if not (tables[0].named and i == layout.runs))
-    return [replace(one, remarks=(*said, *one.remarks[1:])) for one in tables]
+    return [replace(one, remarks=(*said, *below, *one.remarks[1:])) for one in tables]
 
 
-def _in_parts(column: pl.Series, convert: Callable[[pl.Series], pl.Series]) -> pl.Series:
-    """Numbers of a column of texts, part by part: a conversion temporarily takes ten times the memory."""
-    parts = [convert(column.slice(start, _PART)) for start in range(0, max(column.len(), 1), _PART)]
-    return pl.concat(parts)
-
-
-def _as_numbers(column: pl.Series, decimal: str) -> pl.Series:
-    cells = column.str.strip_chars(' \t\r"')
-    cells = cells.str.replace(",", ".", literal=True) if decimal == "," else cells
-    return cells.cast(pl.Float64, strict=False)
-
-
-def _seconds(column: pl.Series) -> pl.Series:
-    """Times of day such as 14:03:07.25, with or without a date, in s since midnight; null if there is none."""
-    text = column.str.strip_chars(' \t\r"')
-    parts = (text.str.extract(_CLOCK, group).str.replace(",", ".") for group in (1, 2, 3))
-    hours, minutes, rest = (part.cast(pl.Float64) for part in parts)
-    half = text.str.extract(_CLOCK, 4).str.to_lowercase()  # the twelfth hour is the first of its half day
-    hours = pl.select(pl.when(half.is_null()).then(hours).otherwise(hours % 12.0)).to_series()
-    hours += (half == "p").fill_null(value=False).cast(pl.Float64) * 12.0
-    return 3600.0 * hours + 60.0 * minutes + rest
+def _with_series(channel: Channel, texts: Mapping[str, pl.Series]) -> Channel:
+    """A column, with the fault that it holds several series where a column of texts distinguishes them."""
+    for name, labels in texts.items():
+        named = labels.n_unique() if _OF_SERIES.fullmatch(name) else 1
+        series = series_by(labels, channel.values) if named == 1 else named
+        if (
+            series > 1
+            and not channel.fault
+            and kind_of(channel.unit) != "time"
+            and not names_a_time(channel.name)
+        ):
+            what = f"holds {series} series, by the column '{one_line(name, 40)}'"
+            remedy = (
+                "write each series into a column or a file of its own, or leave out the rows of the others"
+            )
+            return replace(channel, fault=(what, remedy))
+    return channel
 
 
 def read_cells(path: Path) -> tuple[list[str], list[list[str]]]:

@@ -8,7 +8,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from tunnel_sim.files.importing.formats.text import Layout, facts_in, find_layout, is_number, tables_of
+import polars as pl
+
+from tunnel_sim.files.importing.formats.cells import is_number
+from tunnel_sim.files.importing.formats.layout import Layout, facts_in, find_layout
+from tunnel_sim.files.importing.formats.text import contested, tables_of
 from tunnel_sim.files.importing.tables import LEAST_ROWS, Table, by_run, hold_order
 from tunnel_sim.files.readers import Reader, faults
 from tunnel_sim.files.reading import check_count
@@ -16,6 +20,7 @@ from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, counted, library
 
 _NAMED = 3  # number of sheets that a remark lists
+_MOST_BELOW = 1000  # number of inspected rows without numbers below the first row of numbers
 _HEAD = 400  # number of inspected rows of a sheet
 _TEXTS = (
     "run",
@@ -125,7 +130,16 @@ def _tables(book: Any, sheet: _Sheet, said: str) -> list[Table]:
     kinds = {i: "float" if n and i != layout.runs else "string" for i, n in enumerate(numeric)}
     body = book.load_sheet(sheet.name, header_row=None, skip_rows=layout.first, dtypes=kinds).to_polars()
     labels = None if layout.runs is None else body.to_series(layout.runs)
-    tables = tables_of(body, layout, ".", labels, Table((), facts=layout.facts, remarks=(said,)))
+    table, written = Table((), facts=layout.facts, remarks=(said,)), None
+    empty = body.select(pl.all_horizontal(pl.all().is_null())).to_series()
+    if empty.any():  # they may hold texts: other headings, or statements about the rows below
+        written = book.load_sheet(
+            sheet.name, header_row=None, skip_rows=layout.first, dtypes="string"
+        ).to_polars()
+        rows = written.filter(empty).head(_MOST_BELOW).iter_rows() if written.height == empty.len() else ()
+        lines = ["\t".join(filter(None, row)) for row in rows]
+        table = replace(table, facts=contested(layout.facts, lines))
+    tables = tables_of(body, layout, ".", labels, table, written)
     return [part for table in tables if table.channels for part in by_run(table)]
 
 

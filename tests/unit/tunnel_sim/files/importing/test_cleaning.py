@@ -14,7 +14,7 @@ import pytest
 from tests.support.import_files import RATE, decay, written
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.cleaning import cleaned, clipped, from_zero, resolution, restarts
-from tunnel_sim.files.importing.column_numbers import without_overflow
+from tunnel_sim.files.importing.column_numbers import guessed_angle_unit, without_codes, without_overflow
 from tunnel_sim.files.importing.records import read_records
 from tunnel_sim.files.importing.releases import RecordPiece, find_runs, find_runs_of_rate
 from tunnel_sim.files.importing.tables import Channel
@@ -154,6 +154,28 @@ def test_stamps_coarser_than_the_sampling_are_spread() -> None:
     assert np.abs(found.time_s - time).max() <= 0.02
 
 
+@pytest.mark.parametrize("start", [0.0, 0.6])
+@pytest.mark.parametrize("stamp", [0.1, 1.0])
+def test_the_rate_of_coarse_stamps_is_that_of_the_whole_ones(stamp: float, start: float) -> None:
+    """The first and the last second of a clock that shows seconds have fewer samples."""
+    time, angle = decay()
+    clock = np.floor((time + start * stamp) / stamp + 1e-9) * stamp
+    found = cleaned(clock, angle)
+    np.testing.assert_allclose(found.time_s, time, rtol=2e-3, atol=1e-9)
+
+
+@pytest.mark.parametrize("series", [2, 3])
+def test_series_whose_rows_alternate_are_not_one_reading(series: int) -> None:
+    time, angle = decay()
+    rate = np.gradient(angle, time)
+    both = np.stack([angle, rate, angle + 0.05][:series], axis=1).ravel()
+    with pytest.raises(TunnelError, match=f"every time has {series} rows") as refused:
+        cleaned(np.repeat(time, series), both)
+    assert "a column or a file of its own" in refused.value.remedy
+    noisy = angle + 0.02 * np.random.default_rng(1).standard_normal(angle.size)
+    assert cleaned(np.repeat(time[::series], series)[: time.size], noisy).time_s.size == time.size
+
+
 def test_uneven_stamps_are_kept_and_said() -> None:
     time, angle = decay()
     uneven = cleaned(time + 4e-4 * np.sin(np.arange(time.size)), angle)
@@ -184,6 +206,55 @@ def test_overflow_is_taken_out(full: float) -> None:
     assert "overflow" in said[0]
 
 
+@pytest.mark.parametrize(
+    ("heading", "full", "choices"),
+    [
+        ("angle [rev]", 1.0, ImportChoices()),
+        ("angle [gon]", 400.0, ImportChoices()),
+        ("angle [mrad]", 2000.0 * np.pi, ImportChoices()),
+        ("encoder [counts]", 4000.0, ImportChoices(counts_per_turn=4000.0)),
+        ("sensor [V]", 5.0, ImportChoices(calibration="72*V", unit="deg")),
+        ("sensor [V]", 5.0, ImportChoices(calibration="72*V")),
+    ],
+)
+def test_a_turn_has_the_length_that_it_has_in_its_unit(
+    heading: str, full: float, choices: ImportChoices, tmp_path: Path
+) -> None:
+    time, angle = decay()
+    turned = np.mod((angle + 0.1) / (2.0 * np.pi) * full, full)
+    turned = np.round(turned) if choices.counts_per_turn else turned
+    rows = "".join(f"{t:.3f},{y:.8f}\n" for t, y in zip(time, turned, strict=True))
+    (run,) = read_records([written(tmp_path, "a.csv", f"time [s],{heading}\n{rows}")], choices).campaign.runs
+    error = 1e-3 if choices.counts_per_turn else 1e-6
+    np.testing.assert_allclose(run.record.yaw_rad - run.record.yaw_rad[0], angle - angle[0], atol=2 * error)
+
+
+@pytest.mark.parametrize("heading", ["yaw", "yaw [rad]", "x [mm]", "encoder [counts]"])
+def test_a_code_for_a_missing_reading_is_none(heading: str, tmp_path: Path) -> None:
+    time, angle = decay()
+    values = np.round(angle * 4096.0 / (2.0 * np.pi)) if "counts" in heading else angle
+    values[50::97], values[60::97] = -9999.0, 9.91e37
+    rows = "".join(f"{t:.3f},{y:.8g}\n" for t, y in zip(time, values, strict=True))
+    path = written(tmp_path, "a.csv", f"time [s],{heading}\n{rows}")
+    counts = 4096.0 if "counts" in heading else None
+    imported = read_records([path], ImportChoices(counts_per_turn=counts))
+    (run,) = imported.campaign.runs
+    assert np.abs(run.record.yaw_rad).max() < 0.4
+    assert run.record.time_s.size == time.size - values[50::97].size - values[60::97].size
+    said = "; ".join(imported.remarks())
+    assert "readings of -9999, far from all others, taken as missing" in said
+    assert "readings of 9.91e+37, far from" in said
+
+
+def test_one_reading_far_from_all_others_does_not_change_the_unit() -> None:
+    _, angle = decay()
+    angle[700] = 8.2
+    assert guessed_angle_unit(angle)[0] == "rad"
+    found, said = without_codes(angle)
+    assert found is angle
+    assert said == []
+
+
 def test_what_does_not_overflow_is_not_touched() -> None:
     square = np.where(np.arange(2000) // 10 % 2, 300.0, 0.0)
     for reading in (3.0 * np.cos(np.arange(2000) / 40.0), square):
@@ -199,7 +270,7 @@ def test_a_clock_that_starts_anew_begins_another_run(tmp_path: Path) -> None:
     assert [run.id for run in runs] == ["two-1", "two-2"]
     np.testing.assert_allclose(runs[0].record.yaw_rad, angle, atol=1e-8)
     shuffled = np.random.default_rng(1).permutation(time)
-    assert restarts(shuffled) == []
+    assert restarts(shuffled, time) == []
 
 
 BETWEEN = {
@@ -242,7 +313,7 @@ def test_a_missing_row_within_a_run_leaves_one_run(tmp_path: Path, row: str) -> 
 def test_rows_of_several_runs_are_never_sorted_into_one() -> None:
     time, angle = decay()
     late = np.concatenate([time, time + 3.0])  # the second clock starts within the first run's times
-    assert restarts(late) == [time.size]
+    assert restarts(late, np.concatenate([angle, angle])) == [time.size]
     shuffled = np.random.default_rng(1).permutation(late.size)
     both = np.concatenate([angle, decay(2, amplitude=0.2)[1]])
     with pytest.raises(TunnelError, match="rows are out of order"):
@@ -252,12 +323,31 @@ def test_rows_of_several_runs_are_never_sorted_into_one() -> None:
         cleaned(offset, both[shuffled])
 
 
+def test_a_clock_that_is_set_back_ends_a_run_unless_it_repeats_rows() -> None:
+    time, angle = decay()
+    back = np.where(time < 4.0, time, np.round(time - 0.8, 9))  # onto stamps of the first part
+    assert restarts(back, angle) == [800]
+    again = np.concatenate([time[:800], time[640:]])
+    assert restarts(again, np.concatenate([angle[:800], angle[640:]])) == []
+
+
 def test_rows_of_one_run_are_sorted_however_mixed_up() -> None:
     time, angle = decay()
     shuffled = np.random.default_rng(1).permutation(time.size)
     found = cleaned(time[shuffled], angle[shuffled])
     np.testing.assert_array_equal(found.reading, angle)
     assert "sorted" in "; ".join(found.remarks)
+
+
+def test_rows_from_the_last_to_the_first_are_one_record() -> None:
+    time, angle = decay()
+    uneven = time + 1e-3 * np.random.default_rng(1).random(time.size)
+    found = cleaned(uneven[::-1], angle[::-1])
+    np.testing.assert_array_equal(found.reading, angle)
+    np.testing.assert_allclose(found.time_s, uneven - uneven[0], atol=1e-8)
+    coarse = cleaned(np.floor(time[::-1] * 50.0) / 50.0, angle[::-1])
+    np.testing.assert_array_equal(coarse.reading, angle)
+    assert np.abs(coarse.time_s - time).max() <= 0.02
 
 
 def test_coarse_stamps_are_not_spread_across_a_gap() -> None:

@@ -9,7 +9,7 @@ from tunnel_sim import TunnelError
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.column_names import named_kind
 from tunnel_sim.files.importing.columns import find_pairs
-from tunnel_sim.files.importing.formats.text import find_layout
+from tunnel_sim.files.importing.formats.layout import find_layout
 from tunnel_sim.files.importing.tables import Channel, Table
 
 TIME = 0.05 * np.arange(200)
@@ -99,6 +99,24 @@ def test_a_column_that_hardly_moves_beside_another_is_left_out(share: float, lef
     else:
         with pytest.raises(TunnelError, match="2 columns may be the angle: 'yaw', 'roll'"):
             pairs(*columns)
+
+
+@pytest.mark.parametrize("cycles", [2.0, 20.0])
+def test_an_angle_beside_its_acceleration_is_not_still(cycles: float) -> None:
+    """Without units the sizes do not compare: at 2 Hz the acceleration is 158 times the angle."""
+    time, omega = np.arange(4000) / 1000.0, 2.0 * np.pi * cycles
+    swing = np.cos(omega * time)
+    columns = (
+        Channel("time", time, "s"),
+        Channel("theta", swing),
+        Channel("alpha", -(omega**2) * swing),
+    )
+    with pytest.raises(TunnelError, match="2 columns may be the angle: 'theta', 'alpha'"):
+        pairs(*columns)
+    rate = Channel("beta", -omega * np.sin(omega * time))
+    taken, said = pairs(*columns[:2], rate)
+    assert taken == [("", "time", "theta")]
+    assert "'beta' is left out: it is the rate of another column" in said
 
 
 def test_runs_that_share_their_times_are_named_by_their_marks() -> None:

@@ -14,7 +14,7 @@ from identification import identify
 from tests.support.import_files import RATE, csv, decay, written
 from tunnel_sim import TunnelError
 from tunnel_sim.files.importing.choices import ImportChoices, parse_setting, parse_times
-from tunnel_sim.files.importing.condition_names import condition_of, resembles
+from tunnel_sim.files.importing.condition_names import Conditions, condition_of, resembles
 from tunnel_sim.files.importing.conditions import Unstated
 from tunnel_sim.files.importing.records import read_records
 
@@ -423,3 +423,48 @@ def test_few_samples_per_cycle_are_accepted_with_a_note(per_cycle: float, kept: 
     assert estimate.runs[0].omega_n is not None
     assert estimate.runs[0].omega_n.value == pytest.approx(4.0 * np.pi, rel=1e-3)
     assert any("samples per cycle" in str(remark) for remark in estimate.remarks)
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        "V = 0 m/s;;V = 10 m/s;",
+        "Wind speed: 12 m/s\nWind speed: 10 m/s",
+        "Wind speed: 12 m/s\nWindgeschwindigkeit: 10 m/s",
+    ],
+)
+def test_a_condition_with_several_numbers_is_asked_about(head: str, tmp_path: Path) -> None:
+    """Two runs side by side, each below its own speed, or a speed that was corrected: the last is not taken."""
+    time, angle = decay()
+    rows = "".join(f"{t:.3f};{y:.8f};{t:.3f};{y:.8f}\n" for t, y in zip(time, angle, strict=True))
+    path = written(tmp_path, "log.csv", f"{head}\nt [s];yaw [rad];t [s];yaw [rad]\n{rows}")
+    with pytest.raises(
+        TunnelError, match="the file states several numbers; wind-off is not assumed"
+    ) as fault:
+        read_records([path])
+    assert "--conditions RUNS.csv" in f"{fault.value}"
+    still = ImportChoices(conditions=Conditions(wind_speed=0.0))
+    assert [run.wind_speed for run in read_records([path], still).campaign.runs] == [0.0, 0.0]
+    agreed = head.replace("12 m/s", "36 km/h").replace("V = 0", "V = 10")
+    path = written(tmp_path, "log.csv", f"{agreed}\nt [s];yaw [rad];t [s];yaw [rad]\n{rows}")
+    given = ImportChoices(conditions=Conditions(air_density=1.2))
+    assert [run.wind_speed for run in read_records([path], given).campaign.runs] == [10.0, 10.0]
+
+
+@pytest.mark.parametrize("heading", ["V [cm/s]", "speed [km/min]", "U_inf [ft/min]"])
+def test_a_speed_in_an_unknown_unit_is_not_wind_off(heading: str, tmp_path: Path) -> None:
+    with pytest.raises(TunnelError, match="its unit is not one of m/s, km/h") as fault:
+        read_records([with_column(tmp_path, heading, 1000.0)])
+    assert "wind-off is not assumed beside it" in f"{fault.value}"
+
+
+@pytest.mark.parametrize("heading", ["spring [lbf·in/rad]", "k [kgf cm/deg]"])
+def test_a_stiffness_in_an_unknown_unit_is_said(heading: str, tmp_path: Path) -> None:
+    imported = read_records([with_column(tmp_path, heading, 142.67)])
+    assert "its unit is not one of N m/rad" in "; ".join(imported.remarks())
+
+
+@pytest.mark.parametrize("heading", ["q [Pa]", "vitesse du vent", "風速", "velocità del vento"])
+def test_a_wind_under_other_names_is_not_wind_off(heading: str, tmp_path: Path) -> None:
+    with pytest.raises(TunnelError, match="wind-off is not assumed beside it"):
+        read_records([with_column(tmp_path, heading, 60.0)])

@@ -12,6 +12,7 @@ import pytest
 
 from tests.support.import_files import decay, written
 from tunnel_sim import TunnelError
+from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.records import read_records
 from tunnel_sim.files.importing.units import UNITS, known_unit, split_unit
 
@@ -32,6 +33,14 @@ HEADINGS = {
     "Drehwinkel (Grad)": ("Drehwinkel", "deg"),
     "Winkel [grad]": ("Winkel", "deg"),
     "Winkel/gon": ("Winkel", "gon"),
+    "timeMs": ("time", "ms"),
+    "angleDeg": ("angle", "deg"),
+    "yawRad": ("yaw", "rad"),
+    "ZGyro": ("ZGyro", ""),
+    "Angle (degrés)": ("Angle", "deg"),
+    "Ángulo (grados)": ("Ángulo", "deg"),
+    "角度 (度)": ("角度", "deg"),
+    "時間 (秒)": ("時間", "s"),
     "Angle - deg": ("Angle", "deg"),
     "Angle:deg": ("Angle", "deg"),
     "U/V": ("U", "V"),
@@ -160,3 +169,34 @@ def test_a_table_of_nothing_but_names_of_runs_is_refused_in_one_line(
     with pytest.raises(TunnelError, match="no column") as caught:
         read_records([path])
     assert str(path) in str(caught.value)
+
+
+@pytest.mark.parametrize("heading", ["gyro_rads", "omega [rad]", "speed (deg)"])
+def test_a_rate_in_a_unit_of_an_angle_is_asked_about(heading: str, tmp_path: Path) -> None:
+    time, angle = decay()
+    rows = "".join(f"{t:.3f},{y:.8f}\n" for t, y in zip(time, angle, strict=True))
+    path = written(tmp_path, "log.csv", f"time_s,{heading}\n{rows}")
+    with pytest.raises(TunnelError, match=r"is a rate by its name, and in (rad|deg), a unit of an angle"):
+        read_records([path])
+    assert read_records([path], ImportChoices(unit="rad/s")).campaign.sensor.quantity == "rate"
+
+
+@pytest.mark.parametrize("head", ["Units: deg", "angle_unit: deg", "Einheit;Grad"])
+def test_a_unit_above_the_table_is_not_passed_over(head: str, tmp_path: Path) -> None:
+    """A swing of 0.35 degrees would be taken as one of 0.35 rad."""
+    time, angle = decay()
+    rows = "".join(f"{t:.3f};{y:.8f}\n" for t, y in zip(time, angle, strict=True))
+    path = written(tmp_path, "log.csv", f"{head}\nt [s];yaw\n{rows}")
+    with pytest.raises(TunnelError, match="may state the unit of 'yaw'; give --unit deg, or --unit rad"):
+        read_records([path])
+    (run,) = read_records([path], ImportChoices(unit="deg")).campaign.runs
+    assert run.record.yaw_rad == pytest.approx(np.radians(angle), abs=1e-8)
+
+
+def test_a_calibration_converts_millivolts_whatever_the_unit_of_the_angle(tmp_path: Path) -> None:
+    time, angle = decay()
+    volts = np.degrees(angle) / 20.0
+    rows = "".join(f"{t:.3f},{1e3 * v:.6f}\n" for t, v in zip(time, volts, strict=True))
+    path = written(tmp_path, "log.csv", f"t [s],sensor [mV]\n{rows}")
+    (run,) = read_records([path], ImportChoices(calibration="20*V", unit="deg")).campaign.runs
+    assert run.record.yaw_rad == pytest.approx(angle, abs=1e-6)

@@ -266,3 +266,18 @@ def test_a_link_out_of_an_hdf5_file_is_not_followed(tmp_path: Path) -> None:
         file.create_dataset("raw", (400,), external=[(str(tmp_path / "secret.h5"), 0, 3200)], dtype="f8")
     with pytest.raises(TunnelError, match="no column of numbers"):
         read_records([tmp_path / "link.h5"])
+
+
+def test_integers_packed_as_netcdf_does_are_unpacked(tmp_path: Path) -> None:
+    """Steps of 0.01 degrees are no degrees."""
+    time, angle = decay(amplitude=0.06)
+    path = tmp_path / "packed.h5"
+    with h5py.File(path, "w") as file:
+        file["time_s"] = time
+        steps = np.round((np.degrees(angle) - 1.0) / 0.01).astype(np.int16)
+        steps[300] = -32768
+        packed = file.create_dataset("yaw", data=steps)
+        packed.attrs.update({"units": "deg", "scale_factor": 0.01, "add_offset": 1.0})
+        packed.attrs["_FillValue"] = np.int16(-32768)
+    (run,) = read_records([path]).campaign.runs
+    np.testing.assert_allclose(run.record.yaw_rad, np.delete(angle, 300), atol=1e-4)

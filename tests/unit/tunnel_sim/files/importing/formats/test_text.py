@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.support.import_files import Text, any_dialect, csv, decay, written
+from tests.support.import_files import RATE, Text, any_dialect, csv, decay, written
 from tunnel_sim import TunnelError
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.columns import find_pairs
-from tunnel_sim.files.importing.formats.text import facts_in, find_dialect
+from tunnel_sim.files.importing.formats.layout import facts_in
+from tunnel_sim.files.importing.formats.text import find_dialect
 from tunnel_sim.files.importing.records import read_records
 from tunnel_sim.files.importing.tables import Channel, Table
 from tunnel_sim.files.importing.units import known_unit, split_unit
@@ -44,6 +45,7 @@ def test_a_dialect_is_understood(seed: int, tmp_path: Path) -> None:
         (["0.5", "0.6"], "\t", ".", 1),
         (["10:00:01;0,5;ok", "10:00:02;0,25;ok"], ";", ",", 3),
         (["1e-3|-2E+1", ".5|5."], "|", ".", 2),
+        (["1.204;0,5", "1.205,5;0,4"], ";", ",", 2),
     ],
 )
 def test_the_dialect_of_some_lines(lines: list[str], delimiter: str, decimal: str, width: int) -> None:
@@ -110,6 +112,14 @@ def test_the_rate_is_found_above_the_table(tmp_path: Path) -> None:
     assert run.record.sample_rate == pytest.approx(200.0)
 
 
+@pytest.mark.parametrize("head", ["dt_ms: 5", "Ts_us: 5000", "sample_rate_kHz: 0.2", "delta t = 5 ms"])
+def test_the_rate_above_the_table_has_a_unit(head: str, tmp_path: Path) -> None:
+    time, angle = decay()
+    rows = "".join(f"{y:.8f},1\n" for y in angle)
+    (run,) = read_records([written(tmp_path, "log.csv", f"{head}\nyaw [rad],x\n{rows}")]).campaign.runs
+    np.testing.assert_allclose(run.record.time_s, time, atol=1e-9)
+
+
 def test_a_rate_beside_the_angle_is_not_taken_for_it(tmp_path: Path) -> None:
     time, angle = decay()
     rate = np.gradient(angle, time)
@@ -125,6 +135,7 @@ def test_a_rate_beside_the_angle_is_not_taken_for_it(tmp_path: Path) -> None:
         ("{}", 24),
         ("2026-03-01 {}", 24),
         ("2026-03-01T{}Z", 24),
+        ("2026-03-01 {} UTC", 24),
         ('"{}"', 24),
         ("{} {half}M", 12),
         ("3/1/2026 {}{half}m", 12),
@@ -192,6 +203,171 @@ def test_bad_input_says_what_to_give(tmp_path: Path, content: bytes, what: str, 
     assert what in caught.value.what
     assert remedy in caught.value.remedy
     assert "bad.csv" in caught.value.where
+
+
+@pytest.mark.parametrize("minus", ["\N{MINUS SIGN}", "\N{EN DASH}"])
+def test_a_minus_as_in_print_is_one(minus: str, tmp_path: Path) -> None:
+    _, angle = decay()
+    path = csv(tmp_path)
+    path.write_text(path.read_text("ascii").replace("-", minus), encoding="utf-8")
+    (run,) = read_records([path]).campaign.runs
+    np.testing.assert_allclose(run.record.yaw_rad, angle, atol=1e-6)
+
+
+@pytest.mark.parametrize("form", ["({:.6f})", "{:.6f}-", "-1'{:.6f}", "-1 {:.6f}", "-{:.6f} rad"])
+def test_half_a_column_of_unknown_numbers_is_refused(form: str, tmp_path: Path) -> None:
+    """The other half has the frequency and the damping of the whole one."""
+    time, angle = decay()
+    cells = [form.format(-y) if y < 0.0 else f"{y:.6f}" for y in angle]
+    text = "t [s];yaw [rad]\n" + "".join(f"{t:.3f};{cell}\n" for t, cell in zip(time, cells, strict=True))
+    with pytest.raises(TunnelError, match=r"'yaw' has numbers such as .*, in an unknown form"):
+        read_records([written(tmp_path, "log.csv", text)])
+
+
+def test_a_point_between_thousands_is_no_decimal_point(tmp_path: Path) -> None:
+    """Such a clock, in whole milliseconds, would start anew at each thousand, or lose its first rows."""
+    time, angle = decay(duration=2.5)
+    cells = [f"{y:.6f}".replace(".", ",") for y in angle]
+    clock = [f"{1e3 * t - 1900.0:,.0f}".replace(",", ".") for t in time]
+    rows = [f"{t};{cell}" for t, cell in zip(clock, cells, strict=True)]
+    with pytest.raises(TunnelError, match=r"'Zeit' has numbers such as '-1\.900', in an unknown form"):
+        read_records([written(tmp_path, "log.csv", "\n".join(["Zeit [ms];Winkel [rad]", *rows]))])
+    rows = [f"{t + 0.5:.3f};{cell};1,5" for t, cell in zip(time, cells, strict=True)]
+    path = written(tmp_path, "log.csv", "\n".join(["t [s];yaw [rad];p", *rows]))
+    (run,) = read_records([path]).campaign.runs
+    np.testing.assert_allclose(run.record.time_s, time, atol=1e-9)
+    np.testing.assert_allclose(run.record.yaw_rad, angle, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("above", "below"),
+    [
+        ("Voltage [V],Angle [deg]\n0,-180\n1,-108\n2,-36\n3,36\n\n", ""),
+        ("", "\nPeak,Amplitude\n" + "".join(f"{k},{0.35 * 0.9**k:.4f}\n" for k in range(1, 13))),
+        ("", "# mean\n4.0,0.0012\n# deviation\n4.0,0.145\n"),
+        ("Channel,Gain\n1,10\n2,20\n3,30\n", "\nStatistics,\nMax,0.35\nSamples,1600\n"),
+    ],
+)
+def test_a_short_table_beside_the_record_is_no_part_of_it(above: str, below: str, tmp_path: Path) -> None:
+    time, angle = decay()
+    rows = "".join(f"{t:.3f},{1e3 * y:.6f}\n" for t, y in zip(time, angle, strict=True))
+    path = written(tmp_path, "log.csv", f"{above}Time [s],Angle [mrad]\n{rows}{below}")
+    (run,) = read_records([path]).campaign.runs
+    np.testing.assert_allclose(run.record.time_s, time, atol=1e-9)
+    np.testing.assert_allclose(run.record.yaw_rad, angle, atol=1e-8)
+
+
+def test_commas_between_columns_and_in_numbers_need_quotes(tmp_path: Path) -> None:
+    time, angle = decay()
+    rows = [
+        [f"{t:.3f}".replace(".", ","), f"{y:.6f}".replace(".", ",")] for t, y in zip(time, angle, strict=True)
+    ]
+    bare = "\n".join(["t [s],yaw [rad]", *map(",".join, rows)])
+    with pytest.raises(TunnelError, match="commas separate the columns, and are decimal signs as well"):
+        read_records([written(tmp_path, "bare.csv", bare)])
+    quoted = "\n".join(['"t [s]","yaw [rad]"', *(f'"{t}","{y}"' for t, y in rows)])
+    (run,) = read_records([written(tmp_path, "quoted.csv", quoted)]).campaign.runs
+    np.testing.assert_allclose(run.record.yaw_rad, angle, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("head", "row"),
+    [('"time_s" "yaw_rad"', '"{}" {:.3f} {:.8f}'), ("time_s,yaw_rad", "{},{:.3f},{:.8f}")],
+)
+def test_the_numbers_of_rows_may_have_no_name(head: str, row: str, tmp_path: Path) -> None:
+    time, angle = decay()
+    rows = [row.format(i, t, y) for i, (t, y) in enumerate(zip(time, angle, strict=True), 1)]
+    (run,) = read_records([written(tmp_path, "log.txt", "\n".join([head, *rows]))]).campaign.runs
+    np.testing.assert_allclose(run.record.time_s, time, atol=1e-9)
+    np.testing.assert_allclose(run.record.yaw_rad, angle, atol=1e-8)
+
+
+def test_seconds_and_milliseconds_in_two_columns_are_no_clock(tmp_path: Path) -> None:
+    time, angle = decay()
+    rows = [f"{int(t + 7)},{1e3 * (t % 1.0):.0f},{y:.8f}" for t, y in zip(time, angle, strict=True)]
+    path = written(tmp_path, "log.csv", "\n".join(["Second,ms,yaw [rad]", *rows]))
+    with pytest.raises(TunnelError, match="the times are in two columns, 'Second', 'ms'"):
+        read_records([path])
+
+
+def tidy(time: np.ndarray, angle: np.ndarray) -> dict[str, list[str]]:
+    """Rows of times, texts and readings: two series in one column, or one with a text beside it."""
+    rate = np.gradient(angle, time)
+    values = list(zip(time, angle, rate, strict=True))
+    return {
+        "t,variable,value": [
+            *(f"{t:.4f},angle,{y:.6f}" for t, y, _ in values),
+            *(f"{t:.4f},rate,{v:.6f}" for t, _, v in values),
+        ],
+        "t,sensor,yaw": [
+            row for t, y, v in values for row in (f"{t:.4f},a,{y:.6f}", f"{t + 0.002:.4f},b,{v:.6f}")
+        ],
+        "t,status,yaw": [
+            f"{t:.4f},OK,{y:.6f}" if i % 40 else f"{t:.4f},ERR,0.0" for i, (t, y, _) in enumerate(values)
+        ],
+    }
+
+
+@pytest.mark.parametrize(("name", "column"), [("value", "variable"), ("yaw", "sensor"), ("yaw", "status")])
+def test_series_that_a_column_of_texts_distinguishes_are_not_one(
+    name: str, column: str, tmp_path: Path
+) -> None:
+    head = f"t,{column},{name}"
+    path = written(tmp_path, "log.csv", "\n".join([head, *tidy(*decay())[head]]))
+    with pytest.raises(TunnelError, match=f"'{name}' holds 2 series, by the column '{column}'"):
+        read_records([path])
+
+
+def test_texts_beside_one_series_distinguish_none(tmp_path: Path) -> None:
+    time, angle = decay()
+    rows = [
+        f"{'TRUE' if i % 7 else 'FALSE'},{t:.3f},{y:.8f}"
+        for i, (t, y) in enumerate(zip(time, angle, strict=True))
+    ]
+    (run,) = read_records([written(tmp_path, "a.csv", "\n".join(["valid,t,yaw", *rows]))]).campaign.runs
+    np.testing.assert_allclose(run.record.yaw_rad, angle, atol=1e-8)
+    rows = [f"E{k},{t:.3f},{y:.8f}" for k in (1, 2, 3) for t, y in zip(*decay(k), strict=True)]
+    path = written(tmp_path, "b.csv", "\n".join(["experiment,t,yaw", *rows]))
+    assert len(read_records([path]).campaign.runs) == 3
+
+
+@pytest.mark.parametrize(
+    ("heading", "factors", "match"),
+    [
+        ("t [s],yaw [deg]", (1.0, 1.0), "'yaw' has another heading below the first one, 'yaw \\[deg\\]'"),
+        ("t [ms],yaw [rad]", (1e3, 1.0), "'t' has another heading below the first one, 't \\[ms\\]'"),
+        ("V = 10 m/s\nt [s],yaw [rad]", (1.0, 1.0), "'V' is left out: the file states several numbers"),
+    ],
+)
+def test_another_heading_below_the_first_one_counts(
+    heading: str, factors: tuple[float, float], match: str, tmp_path: Path
+) -> None:
+    time, angle = decay()
+    below = [f"{factors[0] * t:.3f},{y:.8f}" for t, y in zip(*decay(2), strict=True)]
+    above = [f"{t:.3f},{y:.8f}" for t, y in zip(time, angle, strict=True)]
+    lines = ["V = 0 m/s", "t [s],yaw [rad]", *above, "", heading, *below]
+    with pytest.raises(TunnelError, match=match):
+        read_records([written(tmp_path, "log.csv", "\n".join(lines))])
+
+
+@pytest.mark.parametrize("end", ["\r\r\n", "\n\n", "\r\n\r\n"])
+def test_doubled_line_ends_are_one(end: str, tmp_path: Path) -> None:
+    time, angle = decay()
+    path = csv(tmp_path)
+    path.write_bytes(path.read_bytes().replace(b"\n", end.encode()))
+    (run,) = read_records([path]).campaign.runs
+    np.testing.assert_allclose(run.record.time_s, time, atol=1e-9)
+    only = written(tmp_path, "only.csv", end.join(["yaw [rad]", *(f"{y:.8f}" for y in angle)]))
+    (run,) = read_records([only], ImportChoices(rate=RATE)).campaign.runs
+    np.testing.assert_allclose(run.record.time_s, time, atol=1e-9)
+
+
+def test_a_quote_ends_a_cell_only_before_a_delimiter() -> None:
+    lines = [f'"{i}" 0.0{i} 0.3{i}' for i in range(9)]
+    found = find_dialect(lines, ImportChoices())
+    assert found is not None
+    assert (found.delimiter, found.width) == (" ", 3)
+    assert found.split(lines[1]) == ["1", "0.01", "0.31"]
 
 
 def test_an_unknown_column_has_a_suggestion(tmp_path: Path) -> None:

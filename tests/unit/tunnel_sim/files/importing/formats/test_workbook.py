@@ -160,3 +160,27 @@ def test_what_the_sheets_leave_open_is_asked_for_at_once(tmp_path: Path) -> None
     said = str(caught.value)
     assert f"{tmp_path / 'rig.xlsx'}, A, {tmp_path / 'rig.xlsx'}, C: 'enc' is in counts; give" in said
     assert "rig.xlsx, B: 2 columns may be the angle: 'yaw', 'pitch'; give" in said
+
+
+@pytest.mark.parametrize(
+    ("below", "match"),
+    [
+        ([("t [s]", "yaw [deg]"), *zip(TIME, ANGLE, strict=True)], "'yaw' has another heading below"),
+        (
+            [("V = 10 m/s",), *zip(TIME, ANGLE, strict=True)],
+            "'V' is left out: the file states several numbers",
+        ),
+    ],
+)
+def test_texts_below_a_record_belong_to_the_next_one(below: Rows, match: str, tmp_path: Path) -> None:
+    above = [("V = 0 m/s",), ("t [s]", "yaw [rad]"), *zip(TIME, ANGLE, strict=True), ()]
+    with pytest.raises(TunnelError, match=match):
+        read_records([book(tmp_path, {"A": [*above, *below]})])
+
+
+def test_a_table_of_peaks_below_a_record_is_no_part_of_it(tmp_path: Path) -> None:
+    peaks = [(k, 0.35 * 0.9**k) for k in range(1, 13)]
+    rows = [("t [s]", "yaw [rad]"), *zip(TIME, ANGLE, strict=True), (), ("Peak", "Amplitude"), *peaks]
+    (run,) = read_records([book(tmp_path, {"A": rows})]).campaign.runs
+    np.testing.assert_allclose(run.record.time_s, TIME, atol=1e-9)
+    np.testing.assert_allclose(run.record.yaw_rad, ANGLE, atol=1e-9)
