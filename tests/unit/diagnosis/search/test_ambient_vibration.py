@@ -169,29 +169,24 @@ def test_a_moment_that_grows_with_the_pressure_is_buffeting() -> None:
     assert layer(answer).process.runs == ("r2", "r3", "r5", "r6")
 
 
-@pytest.mark.parametrize(("moment", "wander"), [(0.0, 2e-3), (0.02, 0.0)])
-def test_zeros_that_differ_are_no_random_moment(moment: float, wander: float) -> None:
+@pytest.mark.parametrize(("moment", "zero", "spring"), [(0.0, 2e-3, 0.0), (0.0, 0.0, 5e-4), (0.02, 0.0, 0.0)])
+def test_zeros_and_springs_that_differ_are_no_random_moment(
+    moment: float, zero: float, spring: float
+) -> None:
+    """Each run swings steadily about its zero; under a random moment its amplitude and its phase wander."""
     data, rng = shaken(campaign(), moment=moment), np.random.default_rng(2)
     runs = [
-        replace(run, record=Record(run.record.time_s, run.record.yaw_rad + wander * rng.standard_normal()))
+        replace(
+            run,
+            record=Record(run.record.time_s, run.record.yaw_rad + zero * rng.standard_normal()),
+            spring_stiffness=(run.spring_stiffness or 0.0) * (1.0 + spring * rng.standard_normal()),
+        )
         for run in data.runs
     ]
     fitted = nominal(replace(data, runs=tuple(runs)))
     process = likeliest(random_moments(fitted, SURROUNDINGS), fitted.settings.moment)
     assert process is not None
-    assert is_slow(fitted, process, SURROUNDINGS, ALL_EFFECTS) == (wander > 0.0)
-
-
-@pytest.mark.parametrize(("moment", "spread"), [(0.0, 5e-4), (0.02, 0.0)])
-def test_springs_that_differ_from_run_to_run_are_no_random_moment(moment: float, spread: float) -> None:
-    """Each run swings steadily; under a random moment its amplitude and its phase wander."""
-    data, rng = shaken(campaign(), moment=moment), np.random.default_rng(3)
-    stated = [run.spring_stiffness * (1.0 + spread * rng.standard_normal()) for run in data.runs]
-    runs = [replace(run, spring_stiffness=one) for run, one in zip(data.runs, stated, strict=True)]
-    fitted = nominal(replace(data, runs=tuple(runs)))
-    process = likeliest(random_moments(fitted, SURROUNDINGS), fitted.settings.moment)
-    assert process is not None
-    assert is_slow(fitted, process, SURROUNDINGS, ALL_EFFECTS) == (spread > 0.0)
+    assert is_slow(fitted, process, SURROUNDINGS, ALL_EFFECTS) == (moment == 0.0)
 
 
 def test_a_spring_of_its_own_is_no_random_moment_and_hides_none() -> None:
