@@ -129,6 +129,7 @@ def test_every_kind_of_answer_is_a_document_of_the_schema(name):
         assert [run.after for run in document.gap.runs] == [run.before for run in document.gap.runs]
     if not causes:
         assert abs(document.gap.excess_before) < 0.1
+        assert document.by_run is None
 
 
 def finely(data, noise, effect=QUADRATIC):
