@@ -205,15 +205,6 @@ def test_records_without_noise_are_answered_with_a_status(effect, causes):
         assert answer.gap.p_value == 1.0
 
 
-@pytest.mark.slow
-def test_the_source_of_the_noise_is_said():
-    data = campaign()
-    assert diagnose(data, kinds=FEW).noise.source == "stated"
-    wrong = diagnose(replace(data, sensor=replace(data.sensor, noise_std=8e-4)), kinds=FEW).noise
-    assert wrong.source == "estimated"
-    assert "contradict the stated 0.0008 rad" in wrong.reason
-
-
 def test_the_probability_in_words_is_that_of_the_first_candidate(found):
     answer = answer_of(found)
     assert f"(probability {100.0 * answer.candidates[0].probability:.0f} %)" in answer.verdict
