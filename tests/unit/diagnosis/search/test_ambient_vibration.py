@@ -319,10 +319,8 @@ def test_a_random_moment_about_a_frequency_is_no_steady_line() -> None:
 
 
 def test_a_moment_of_all_runs_is_not_called_buffeting_where_the_surroundings_are_excluded() -> None:
-    found = answers(shaken(campaign(), moment=0.02), ALL_RANDOM[:2])
-    assert all(
-        layer(answer).left.share > 0.2 for answer in found
-    )  # the runs with the wind off keep their gap
+    (answer,) = answers(shaken(campaign(), moment=0.02), ALL_RANDOM[:2])
+    assert layer(answer).left.share > 0.2  # the runs with the wind off keep their gap
 
 
 def test_the_moment_of_the_surroundings_has_the_scale_of_the_rig() -> None:

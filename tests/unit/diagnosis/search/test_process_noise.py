@@ -272,12 +272,6 @@ def test_an_effect_of_the_wind_that_is_weak_beside_turbulence_is_found():
     assert answer.fit.value("nonlinear_yaw_moment.coefficient") == pytest.approx(0.6, rel=0.5)
 
 
-def test_a_random_moment_closes_little_of_a_gap_that_is_in_still_air_too():
-    base = nominal(campaign(effect_from("cubic_stiffness", {"coefficient": -0.2})))
-    found = weigh_random_moments(whole_runs(base, (*BUFFETING, effect_class("coulomb_friction"))), [])
-    assert all(left(answer).share > 0.2 for answer in found)
-
-
 def test_turbulence_as_noise_leaves_white_residuals_of_the_stated_variance(windy, found):
     data = with_response(windy, found.spectrum)
     again = fit(replace(windy.problem, data=data), windy.point)
