@@ -31,6 +31,8 @@ _LONG = (
     "many",
     "presliding_flexible_rod",
     "presliding_and_turbulence",
+    "loaded_friction_flexible_rod",
+    "stribeck_friction_flexible_rod",
 )  # their oracles are
 
 

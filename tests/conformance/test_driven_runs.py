@@ -226,7 +226,7 @@ MODE = (
         slow("no spring stated", *CUBIC),
         ("root", *CUBIC),
         slow("unknown gain", *CUBIC),
-        ("loose", *RUBS),
+        slow("loose", *RUBS),
         slow("moment", *RUBS),
         slow("rates", *RUBS),
         slow("uneven", *RUBS),

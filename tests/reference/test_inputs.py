@@ -99,7 +99,7 @@ def test_the_closed_form_is_the_integrated_linear_response(column, held):
 
 def test_the_nominal_fit_finds_rig_and_gain_again():
     c = rig(
-        (21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4, duration=4.0, sample_rate=250.0
+        (21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4, duration=2.0, sample_rate=250.0
     )
     values = np.random.default_rng(1).standard_normal((c.samples, 4)) * 4.0
     unknown = DrivenInput("drive", values, np.full(4, False), np.full(4, 0.1), 0.5)

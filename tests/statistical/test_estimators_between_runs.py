@@ -20,7 +20,7 @@ from tests.reference.scattering import THREE_SPRINGS, USUAL, scattering
 pytestmark = pytest.mark.usefixtures("unexamined")
 NAMES = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
 FALSE_ALARM = 1e-3  # of one verdict on four quantities
-TRIALS = 100
+TRIALS = 60
 SHAPE = {"noise": 5e-4, "duration": 8.0, "rate": 100.0}
 FOUR = tuple(Setting(spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 20.0))
 SIX = tuple(Setting(spring, speed) for spring in (16.12, 21.02, 44.84) for speed in (0.0, 20.0))

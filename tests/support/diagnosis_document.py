@@ -84,6 +84,11 @@ def rms(excess: Any) -> Any:
     return np.degrees(4.5e-4) * np.sqrt(np.maximum(excess, 0.0))
 
 
+def both(excess: float) -> list[float]:
+    """A gap in degrees and in noise variances."""
+    return [float(rms(excess)), excess]
+
+
 def document() -> dict[str, Any]:
     """The answer, in JSON's types."""
     return {

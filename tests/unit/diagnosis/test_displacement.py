@@ -9,6 +9,7 @@ import json
 import re
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -56,7 +57,10 @@ CASES: dict[str, tuple[str, float, Force, float, float]] = {
 FEW = vocabulary(("coulomb_friction", "cubic_stiffness", "quadratic_damping", "sensor_drift"))
 
 
-@pytest.fixture(scope="module", params=CASES)
+@pytest.fixture(
+    scope="module",
+    params=["dry friction of a stage", pytest.param("cubic spring of a beam", marks=pytest.mark.slow)],
+)
 def case(request: pytest.FixtureRequest) -> tuple[Diagnosis, Campaign, str, float]:
     """A diagnosed campaign."""
     cause, truth, force, hertz, release = CASES[request.param]
@@ -190,11 +194,17 @@ def scaled(campaign: Campaign, factor: float) -> Campaign:
     return replace(campaign, runs=tuple(runs))
 
 
-@pytest.mark.parametrize("quantity", [slow("angle"), "rate"])
+@cache
+def damped_by_the_square(quantity: Quantity) -> tuple[Campaign, Diagnosis]:
+    found = linear_campaign(2.0, (3.0, 5.0), (0.3, 0.15), square, quantity=quantity)
+    return found, diagnose(found, kinds=FEW)
+
+
+@pytest.mark.parametrize("quantity", ["angle", slow("rate")])
 def test_an_angle_and_its_twin_have_the_same_numbers(quantity: Quantity) -> None:
     """Bit for bit, with other units; where the motion has the size of a rig's angle."""
-    displaced = linear_campaign(2.0, (3.0, 5.0), (0.3, 0.15), square, quantity=quantity)
-    own, twin = diagnose(displaced, kinds=FEW), diagnose(displaced.as_angle, kinds=FEW, model=Carriage())
+    displaced, own = damped_by_the_square(quantity)
+    twin = diagnose(displaced.as_angle, kinds=FEW, model=Carriage())
     assert own.causes == twin.causes == ("quadratic_damping",)
     offered = {name: value for name, value in twin.inclusion.items() if name in own.inclusion}
     twin = replace(twin, inclusion=offered)  # of effects that no displacement has the probability is 0
@@ -208,10 +218,9 @@ def test_an_angle_and_its_twin_have_the_same_numbers(quantity: Quantity) -> None
 
 def test_the_size_of_the_motion_changes_no_digit() -> None:
     """A motion of 1/1024 has the same answer, and every number is multiplied by a power of 1024."""
-    usual = linear_campaign(2.0, (3.0, 5.0), (0.3, 0.15), square)
-    large, small = (
-        dict(numbers(diagnose(one, kinds=FEW).to_json_dict())) for one in (usual, scaled(usual, 2.0**-10))
-    )
+    usual, answer = damped_by_the_square("angle")
+    shrunk = diagnose(scaled(usual, 2.0**-10), kinds=FEW)
+    large, small = (dict(numbers(one.to_json_dict())) for one in (answer, shrunk))
     assert large.keys() == small.keys()
     powers = {
         place: np.log2(abs(large[place] / small[place])) / 10.0

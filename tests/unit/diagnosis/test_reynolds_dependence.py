@@ -11,6 +11,7 @@ import pytest
 from diagnosis import diagnose
 from diagnosis.search.investigate import investigate
 from tests.support.acting import acting
+from tests.support.gap_campaigns import nominal
 from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.effects.parameters import Circumstances, WindOnRun
 from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings, simulate_campaign
@@ -33,12 +34,8 @@ def plan(speeds, name="reynolds_dependence", **values):
     return CampaignPlan("speeds", 3, TRUTH, conditions, SensorModel(sample_rate=250.0), effects=effects)
 
 
-def answer(*case, **values):
-    return diagnose(simulate_campaign(plan(*case, **values)), kinds=KINDS)
-
-
 def test_three_speeds_name_it_with_its_size_and_with_cn_beta_at_the_mean_speed():
-    found = answer((0.0, 12.0, 18.0, 25.0), per_e_fold=0.05)
+    found = diagnose(simulate_campaign(plan((0.0, 12.0, 18.0, 25.0), per_e_fold=0.05)), kinds=KINDS)
     assert found.causes == ("reynolds_dependence",)
     size = found.candidates[0].parameters["per_e_fold"]
     assert abs(size.value - 0.05) < 4.0 * size.std
@@ -52,9 +49,8 @@ def test_three_speeds_tell_it_from_an_offset_of_the_speed():
 
 
 def test_two_speeds_are_said_to_tell_them_apart_by_the_damping_alone():
-    (said,) = [
-        one for one in answer((0.0, 15.0, 25.0), per_e_fold=0.05).blind_spots if "two wind speeds" in one
-    ]
+    data = nominal(simulate_campaign(plan((0.0, 15.0, 25.0)))).problem.data
+    (said,) = [one for one in data.model.blind_spots(data) if "two wind speeds" in one]
     assert "offset as opposed to a dependence" in said
 
 

@@ -9,15 +9,12 @@ from hypothesis import strategies as st
 
 from diagnosis.answer import held_out
 from diagnosis.answer.held_out import HeldOut, predict_held_out
-from diagnosis.likelihood.least_squares import fit
-from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.data import Data, folds
 from diagnosis.model.rig import SpringModel
 from diagnosis.model.run_data import RunData
 from diagnosis.model.run_noise import WhiteNoise
 from diagnosis.patch.patched_model import native_closure
-from tests.support.gap_campaigns import nominal
-from tunnel_sim.effects import effect_class
+from tests.support.gap_campaigns import added, nominal
 from tunnel_sim.engine.joint_patch import Start
 from tunnel_sim.physics.run_settings import Motion
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
@@ -64,8 +61,7 @@ def test_one_run_of_each_spring_leaves_nothing_to_hold_out():
 
 @pytest.fixture(scope="module")
 def best(base):
-    lead = starting_points(base, effect_class(CAUSE))[0]
-    return fit(lead.problem, lead.point, base=base)
+    return added(base, CAUSE)
 
 
 def excess(fitted):
@@ -88,8 +84,7 @@ def test_the_right_effect_predicts_runs_it_has_not_seen(base, best):
 
 def test_a_wrong_effect_predicts_worse_than_it_fits(base):
     """What mops up the seen runs does not carry over in full."""
-    lead = starting_points(base, effect_class("coulomb_friction"))[0]
-    wrong = fit(lead.problem, lead.point, base=base)
+    wrong = added(base, "coulomb_friction")
     assert np.mean(list(excess(wrong).values())) > wrong.excess
 
 

@@ -97,10 +97,6 @@ def test_the_finding_is_said_drawn_and_read_back(answer: Diagnosis) -> None:
     assert Diagnosis.from_json_dict(answer.to_json_dict()).by_run == answer.by_run
 
 
-def test_nothing_is_said_where_nothing_is_named() -> None:
-    assert diagnose(campaign(duration=6.0), kinds=FEW).by_run is None
-
-
 def test_a_run_of_another_size_is_said_to_differ(answer: Diagnosis) -> None:
     assert answer.by_run is not None
     (cause,) = answer.by_run.causes

@@ -13,15 +13,14 @@ from diagnosis.findings.cause_sizes import CauseSize, cause_sizes
 from diagnosis.likelihood.least_squares import Fit, fit
 from diagnosis.likelihood.residuals import linear_coefficients
 from diagnosis.likelihood.starting_points import starting_points
-from tests.support.gap_campaigns import campaign, nominal, studied
+from tests.support.gap_campaigns import added, campaign, nominal, studied
 from tunnel_sim.effects import effect_class, effect_from, known_effects
 
 
 def sized(name: str, **parameters: float) -> tuple[CauseSize, Fit]:
     data = campaign(effect_from(name, parameters))
     base = nominal(data)
-    lead = starting_points(base, effect_class(name))[0]
-    best = fit(lead.problem, lead.point, base=base)
+    best = added(base, name)
     (size,) = cause_sizes(studied(data, base, (name,), best))
     assert size.effect == name
     return size, best

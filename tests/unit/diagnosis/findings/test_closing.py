@@ -20,11 +20,10 @@ from diagnosis.findings.closing import (
     report_fits,
 )
 from diagnosis.findings.judgements import cautions
-from diagnosis.likelihood.least_squares import Fit, fit
+from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.partial import refit_releases
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.sensitivities import sensitivities
-from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.data import Data
 from diagnosis.model.fact import Fact
 from diagnosis.model.parameters import Point
@@ -306,8 +305,7 @@ def test_nothing_speaks_of_wind_speeds_where_no_run_had_wind():
 def fits():
     data = campaign(effect_from("quadratic_damping", {"coefficient": 0.003}))
     base = nominal(data)
-    lead = starting_points(base, effect_class("quadratic_damping"))[0]
-    return base, fit(lead.problem, lead.point, base=base)
+    return base, added(base, "quadratic_damping")
 
 
 def test_what_is_reported_is_mujoco_s_at_the_parameters_found(fits):

@@ -23,15 +23,13 @@ from diagnosis.findings.averaged_coefficients import (
     possible_answers,
 )
 from diagnosis.findings.units import own_estimate
-from diagnosis.likelihood.least_squares import fit
-from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.similarity import Similarity
 from diagnosis.search.scatter import as_stated
 from diagnosis.settings import AnswerSettings, Settings
 from identification.show.numbers import estimated
 from identification.show.quantity import Quantity
 from tests.marks import slow
-from tests.support.gap_campaigns import CN_BETA, CN_R, answer, campaign, nominal, precise, studied
+from tests.support.gap_campaigns import CN_BETA, CN_R, added, answer, campaign, nominal, precise, studied
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
 from tunnel_sim.vocabulary.campaign import Repeatability
 
@@ -46,17 +44,9 @@ def only(fitted, data, **fields):
     return coefficients(Answers((Possible(1.0, fitted, **fields),), 0.0, fitted), data)
 
 
-def with_cause(data):
-    """The nominal model, and the same with the named cause."""
-    base = nominal(data)
-    lead = starting_points(base, effect_class(CAUSE))[0]
-    return base, fit(lead.problem, lead.point, base=base)
-
-
 @pytest.fixture(scope="module")
 def best(base):
-    lead = starting_points(base, effect_class(CAUSE))[0]
-    return fit(lead.problem, lead.point, base=base)
+    return added(base, CAUSE)
 
 
 @given(PARTS)
@@ -225,7 +215,7 @@ def test_a_small_cause_that_is_not_named_is_allowed_for(small, parameters, name)
     for seed in (1, 2, 3):
         effects = (effect_from(CAUSE, {"coefficient": 0.003}), effect_from(small, parameters))
         data = precise(campaign(*effects, seed=seed, duration=6.0))
-        _, best = with_cause(data)
+        best = added(nominal(data), CAUSE)
         found = only(best, data, small=beside(best, starts_beside(best, ALL_EFFECTS)))[name]
         errors.append((found.value - TRUE[name]) / found.std)
         plain.append((best.value(name) - TRUE[name]) / best.std(name))

@@ -6,22 +6,15 @@ import numpy as np
 import pytest
 
 from diagnosis.findings.next_run import FurtherRuns, NextRun, planned_run, separation
-from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.normal_equations import normal_equations
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.sensitivities import sensitivities
-from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.parameters import Point
 from diagnosis.search.investigate import nominal_study
 from identification.show.quantity import Quantity
 from tests.support.driven_runs import driven
-from tests.support.gap_campaigns import campaign, nominal
+from tests.support.gap_campaigns import added, campaign, nominal
 from tunnel_sim.effects import effect_class, effect_from
-
-
-def fitted(base, name):
-    lead = starting_points(base, effect_class(name))[0]
-    return fit(lead.problem, lead.point, base=base)
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +22,7 @@ def rivals():
     data = campaign(effect_from("coulomb_friction", {"friction_moment": 0.003}))
     alike = replace(data, runs=tuple(run for run in data.runs if run.spring_stiffness == 16.12))
     base = nominal(alike)
-    return fitted(base, "coulomb_friction"), fitted(base, "quadratic_damping")
+    return added(base, "coulomb_friction"), added(base, "quadratic_damping")
 
 
 def apart(first, second, run, angle):

@@ -31,6 +31,7 @@ from tests.support.diagnosis_document import (
     CONDITIONS,
     IDS,
     RIVAL,
+    both,
     campaign,
     document,
     findings_of,
@@ -116,11 +117,6 @@ def closes(given: Document) -> list[str]:
 def both_text(excess: float) -> str:
     """A gap as a root mean square."""
     return f"{both(excess)[0]:.3f}°"
-
-
-def both(excess: float) -> list[float]:
-    """A gap in degrees, by the noise of the document, and in noise powers."""
-    return [float(np.degrees(4.5e-4) * np.sqrt(max(excess, 0.0))), excess]
 
 
 def test_the_causes_have_their_sizes(given: Document, answer: Answer) -> None:

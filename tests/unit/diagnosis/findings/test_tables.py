@@ -23,7 +23,7 @@ from identification.show.numbers import probability, share
 from identification.show.quantity import Quantity
 from identification.status import Status
 from tests.support import rendered as tables
-from tests.support.diagnosis_document import CONDITIONS, IDS, campaign, document, findings_of
+from tests.support.diagnosis_document import CONDITIONS, IDS, both, campaign, document, findings_of
 from tests.support.rendered import (
     candidates_table,
     coefficients_line,
@@ -112,11 +112,6 @@ def test_the_gap_as_the_causes_are_added(given: Document) -> None:
     assert_shows(" ".join(second[1:]), [*both(2.75), *both(21.85)])
     assert_shows(" ".join(third[1:]), [*both(0.1345), *both(2.85)])
     assert rows(waterfall_table(findings_of(given | {"waterfall": given["waterfall"][:1]}))) == []
-
-
-def both(excess: float) -> list[float]:
-    """A gap in degrees, by the noise of the document, and in noise variances."""
-    return [np.degrees(4.5e-4) * np.sqrt(max(excess, 0.0)), excess]
 
 
 def test_coefficients_that_are_not_determined(given: Document) -> None:

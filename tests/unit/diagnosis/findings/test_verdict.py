@@ -18,16 +18,14 @@ from diagnosis.findings.misfit import Misfit
 from diagnosis.findings.next_steps import next_steps, rival_lines
 from diagnosis.findings.sections import diagnosis_brief
 from diagnosis.findings.verdict import headline, verdict
-from diagnosis.likelihood.least_squares import fit
-from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.settings import Settings
 from identification.estimate import Quantity
 from tests.support.diagnosis_document import campaign, document, findings_of
-from tests.support.gap_campaigns import answer, nominal, studied
+from tests.support.gap_campaigns import added, answer, nominal, studied
 from tests.support.gap_campaigns import campaign as campaign_with
 from tests.support.rendered import candidates_table, parameters_table, runs_table
 from tunnel_lab.report.page import render_report
-from tunnel_sim.effects import effect_class, effect_from, known_effects
+from tunnel_sim.effects import effect_from, known_effects
 
 
 def gap(*held_out: bool) -> GapSummary:
@@ -353,8 +351,7 @@ def nearly_found(*weighed, noisy=False):
     """What nearly explains a gap of quadratic damping, `unknown` being the answer."""
     data = campaign_with(effect_from("quadratic_damping", {"coefficient": 2e-4}))
     base = nominal(data)
-    lead = starting_points(base, effect_class("quadratic_damping"))[0]
-    study = studied(data, base, ("quadratic_damping",), fit(lead.problem, lead.point, base=base))
+    study = studied(data, base, ("quadratic_damping",), added(base, "quadratic_damping"))
     answers = (answer(("unknown",), 1.0, 0.6), *weighed)
     gap = replace(study.gap, test=replace(study.gap.test, noisy=noisy))
     return nearly(replace(study, answers=answers, gap=gap))

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import copy
 import json
+from functools import reduce
+from operator import getitem
 from typing import Any
 
 import pytest
@@ -13,59 +14,38 @@ from tests.support.diagnosis_document import document, findings_of
 from tunnel_sim.vocabulary.errors import TunnelError
 
 
-def misspelt(given: dict[str, Any]) -> None:
-    given["candidates"][0]["probabilty"] = given["candidates"][0].pop("probability")
-
-
-def a_word_for_a_number(given: dict[str, Any]) -> None:
-    given["candidates"][0]["probability"] = "high"
-
-
-def a_list_for_a_mapping(given: dict[str, Any]) -> None:
-    given["coefficients"] = []
-
-
-def a_map_without_its_times(given: dict[str, Any]) -> None:
-    del given["maps"]["time"]["edges_s"]
-
-
-def a_word_in_a_map(given: dict[str, Any]) -> None:
-    given["maps"]["grid"]["excess"][1][0] = "much"
-
-
-def rows_of_several_lengths(given: dict[str, Any]) -> None:
-    given["maps"]["grid"]["excess"][1] = [6.25]
-
-
-def an_unknown_key(given: dict[str, Any]) -> None:
-    given["decided\nby" + 100 * "x"] = "me"
-
-
-def a_misspelt_key_with_a_default(given: dict[str, Any]) -> None:
-    given["found"]["place"]["agree"] = given["found"]["place"].pop("agrees")
-
-
-def a_misspelt_key_of_a_map(given: dict[str, Any]) -> None:
-    given["maps"]["backbones"][2]["alone_zetta"] = 0.01
-
-
 @pytest.mark.parametrize(
-    ("spoil", "place"),
+    ("within", "spoilt", "place"),
     [
-        (misspelt, "candidates.0.probability: Field required"),
-        (a_word_for_a_number, "candidates.0.probability: Input should be a valid number"),
-        (a_list_for_a_mapping, "coefficients: "),
-        (a_map_without_its_times, "maps.time.edges_s: Field required"),
-        (a_word_in_a_map, "maps.grid.excess.1.0: Input should be a valid number"),
-        (rows_of_several_lengths, "maps.grid.excess: Value error, setting an array element"),
-        (an_unknown_key, ": unknown key"),
-        (a_misspelt_key_with_a_default, "found.place.agree: unknown key"),
-        (a_misspelt_key_of_a_map, "maps.backbones.2.alone_zetta: unknown key"),
+        (
+            ("candidates", 0),
+            {"probability": ..., "probabilty": 0.9},
+            "candidates.0.probability: Field required",
+        ),
+        (
+            ("candidates", 0),
+            {"probability": "high"},
+            "candidates.0.probability: Input should be a valid number",
+        ),
+        ((), {"coefficients": []}, "coefficients: "),
+        (("maps", "time"), {"edges_s": ...}, "maps.time.edges_s: Field required"),
+        (("maps", "grid", "excess", 1), {0: "much"}, "maps.grid.excess.1.0: Input should be a valid number"),
+        (("maps", "grid", "excess"), {1: [6.25]}, "maps.grid.excess: Value error, setting an array element"),
+        ((), {"decided\nby" + 100 * "x": "me"}, ": unknown key"),
+        (("found", "place"), {"agrees": ..., "agree": True}, "found.place.agree: unknown key"),
+        (("maps", "backbones", 2), {"alone_zetta": 0.01}, "maps.backbones.2.alone_zetta: unknown key"),
     ],
 )
-def test_a_document_that_does_not_fit_is_refused_with_the_place(spoil: Any, place: str) -> None:
-    given = copy.deepcopy(document())
-    spoil(given)
+def test_a_document_that_does_not_fit_is_refused_with_the_place(
+    within: tuple[str | int, ...], spoilt: dict[Any, Any], place: str
+) -> None:
+    given = document()
+    part = reduce(getitem, within, given)
+    for key, value in spoilt.items():
+        if value is ...:
+            del part[key]
+        else:
+            part[key] = value
     with pytest.raises(TunnelError, match="is not a diagnosis") as refused:
         Diagnosis.from_json_dict(given)
     assert place in str(refused.value)

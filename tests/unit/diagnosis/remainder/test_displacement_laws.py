@@ -90,6 +90,7 @@ def test_a_proposed_law_has_own_units_and_the_true_sizes(
     assert " in the displacement b explains " in answer.closable.words
 
 
+@pytest.mark.slow
 def test_a_proposed_law_is_found_again(found: tuple[Diagnosis, Campaign, float], tmp_path: Path) -> None:
     answer, campaign, width = found
     path = write_proposal(tmp_path / "law.toml", answer)

@@ -16,7 +16,7 @@ from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorP
 from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.record import Array, Record
 
-RATE, STEP, SECONDS = 100.0, 5e-4, 20.0
+RATE, STEP, SECONDS = 100.0, 5e-4, 12.0
 INERTIA, DAMPING, STIFFNESS = 0.12, 0.1, 3.0
 SLIDING, RISE, WIDTH = 0.06, 0.06, 0.15  # N m, N m and rad/s
 BY_ANGLE = 0.1  # N m/rad

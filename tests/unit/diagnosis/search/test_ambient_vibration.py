@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 from diagnosis.findings.averaged_coefficients import coefficients, possible_answers
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import investigate
-from diagnosis.search.process_noise import MomentLayer, is_of_reading, likeliest, random_moments
+from diagnosis.search.process_noise import is_of_reading, likeliest, random_moments
 from diagnosis.search.random_moments import obeys_a_law, weigh_random_moments
 from diagnosis.search.random_spectra import (
     LONGEST_BANDWIDTH,
@@ -40,6 +40,7 @@ from tests.support.gap_campaigns import (
     whole_runs,
 )
 from tests.support.scattered_runs import SCATTERED
+from tests.unit.diagnosis.search.test_process_noise import moment_of
 from tunnel_sim.effects import ALL_EFFECTS, Effect, effect_class, effect_from
 from tunnel_sim.vocabulary.campaign import Campaign, Repeatability
 from tunnel_sim.vocabulary.record import Record
@@ -99,11 +100,6 @@ def of(conditions: Sequence[tuple[float, float]], *effects: Effect) -> Campaign:
     return replace(data, runs=data.runs[: len(conditions)])
 
 
-def layer(answer: Hypothesis) -> MomentLayer:
-    assert answer.moment is not None
-    return answer.moment
-
-
 def answers(data: Campaign, kinds: Sequence[type[Effect]] = ALL_RANDOM) -> list[Hypothesis]:
     return weigh_random_moments(whole_runs(nominal(data), kinds), [])
 
@@ -111,12 +107,12 @@ def answers(data: Campaign, kinds: Sequence[type[Effect]] = ALL_RANDOM) -> list[
 def test_a_moment_that_acts_with_the_wind_off_as_well_is_ambient_vibration() -> None:
     (answer,) = answers(shaken(campaign(), moment=0.02))
     assert answer.names == ("ambient_vibration",)
-    assert layer(answer).left.share < 0.1
-    (part,) = layer(answer).process.spectrum
+    assert moment_of(answer).left.share < 0.1
+    (part,) = moment_of(answer).process.spectrum
     assert part.intensity == pytest.approx(0.02, rel=0.3)
     # at the rig only the level of the spectrum around resonance is seen well
     assert part.intensity**2 / part.bandwidth == pytest.approx(0.02**2 / BANDWIDTH, rel=0.3)
-    assert len(layer(answer).process.runs) == len(CONDITIONS)
+    assert len(moment_of(answer).process.runs) == len(CONDITIONS)
 
 
 def test_a_floor_that_resonates_is_ambient_vibration() -> None:
@@ -166,32 +162,27 @@ def test_stated_differences_between_runs_do_not_pull_the_coefficients() -> None:
 def test_a_moment_that_grows_with_the_pressure_is_buffeting() -> None:
     (answer,) = answers(shaken(campaign(), coefficient=0.01))
     assert answer.names == ("buffeting",)
-    assert layer(answer).process.runs == ("r2", "r3", "r5", "r6")
+    assert moment_of(answer).process.runs == ("r2", "r3", "r5", "r6")
 
 
-@pytest.mark.parametrize(("moment", "wander"), [(0.0, 2e-3), (0.02, 0.0)])
-def test_zeros_that_differ_are_no_random_moment(moment: float, wander: float) -> None:
+@pytest.mark.parametrize(("moment", "zero", "spring"), [(0.0, 2e-3, 0.0), (0.0, 0.0, 5e-4), (0.02, 0.0, 0.0)])
+def test_zeros_and_springs_that_differ_are_no_random_moment(
+    moment: float, zero: float, spring: float
+) -> None:
+    """Each run swings steadily about its zero; under a random moment its amplitude and its phase wander."""
     data, rng = shaken(campaign(), moment=moment), np.random.default_rng(2)
     runs = [
-        replace(run, record=Record(run.record.time_s, run.record.yaw_rad + wander * rng.standard_normal()))
+        replace(
+            run,
+            record=Record(run.record.time_s, run.record.yaw_rad + zero * rng.standard_normal()),
+            spring_stiffness=(run.spring_stiffness or 0.0) * (1.0 + spring * rng.standard_normal()),
+        )
         for run in data.runs
     ]
     fitted = nominal(replace(data, runs=tuple(runs)))
     process = likeliest(random_moments(fitted, SURROUNDINGS), fitted.settings.moment)
     assert process is not None
-    assert is_slow(fitted, process, SURROUNDINGS, ALL_EFFECTS) == (wander > 0.0)
-
-
-@pytest.mark.parametrize(("moment", "spread"), [(0.0, 5e-4), (0.02, 0.0)])
-def test_springs_that_differ_from_run_to_run_are_no_random_moment(moment: float, spread: float) -> None:
-    """Each run swings steadily; under a random moment its amplitude and its phase wander."""
-    data, rng = shaken(campaign(), moment=moment), np.random.default_rng(3)
-    stated = [run.spring_stiffness * (1.0 + spread * rng.standard_normal()) for run in data.runs]
-    runs = [replace(run, spring_stiffness=one) for run, one in zip(data.runs, stated, strict=True)]
-    fitted = nominal(replace(data, runs=tuple(runs)))
-    process = likeliest(random_moments(fitted, SURROUNDINGS), fitted.settings.moment)
-    assert process is not None
-    assert is_slow(fitted, process, SURROUNDINGS, ALL_EFFECTS) == (spread > 0.0)
+    assert is_slow(fitted, process, SURROUNDINGS, ALL_EFFECTS) == (moment == 0.0)
 
 
 def test_a_spring_of_its_own_is_no_random_moment_and_hides_none() -> None:
@@ -222,7 +213,7 @@ def test_both_at_once_are_one_spectrum_with_a_part_of_each() -> None:
 def test_runs_in_one_wind_cannot_tell_them_apart() -> None:
     found = answers(shaken(of(ONE_WIND), ONE_WIND, moment=0.03))
     assert {answer.names for answer in found} == {("ambient_vibration",), ("buffeting",)}
-    first, second = (layer(answer).left.share for answer in found)
+    first, second = (moment_of(answer).left.share for answer in found)
     assert first == pytest.approx(second, abs=1e-3)
 
 
@@ -231,7 +222,7 @@ def test_of_two_kinds_that_the_runs_cannot_tell_apart_the_one_that_may_be_named_
     data = shaken(of(ONE_WIND), ONE_WIND, moment=0.03)
     for kind in (AMBIENT, BUFFETING):
         (answer,) = answers(data, (kind,))
-        assert layer(answer).kinds == (kind,)
+        assert moment_of(answer).kinds == (kind,)
 
 
 @pytest.mark.slow
@@ -324,10 +315,8 @@ def test_a_random_moment_about_a_frequency_is_no_steady_line() -> None:
 
 
 def test_a_moment_of_all_runs_is_not_called_buffeting_where_the_surroundings_are_excluded() -> None:
-    found = answers(shaken(campaign(), moment=0.02), ALL_RANDOM[:2])
-    assert all(
-        layer(answer).left.share > 0.2 for answer in found
-    )  # the runs with the wind off keep their gap
+    (answer,) = answers(shaken(campaign(), moment=0.02), ALL_RANDOM[:2])
+    assert moment_of(answer).left.share > 0.2  # the runs with the wind off keep their gap
 
 
 def test_the_moment_of_the_surroundings_has_the_scale_of_the_rig() -> None:

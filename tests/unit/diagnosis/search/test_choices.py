@@ -15,11 +15,11 @@ from diagnosis.findings.verdict import verdict
 from diagnosis.likelihood.least_squares import fit, scaled_residuals
 from diagnosis.likelihood.residuals import misfit
 from diagnosis.model.run_noise import WhiteNoise
-from diagnosis.search.choices import _exchanged, choices
+from diagnosis.search.choices import _exchanged
 from diagnosis.search.investigate import investigate
 from diagnosis.search.study import _gap_beside
 from tests.support.diagnosis_document import document, findings_of
-from tests.support.gap_campaigns import CN_BETA, CONDITIONS, campaign, precise
+from tests.support.gap_campaigns import CN_BETA, campaign, precise
 from tunnel_sim.effects import effect_class, effect_from
 
 NAME = "spring_miscalibration"
@@ -92,12 +92,3 @@ def test_the_first_step_is_to_tell_the_springs_apart(study):
         "stated (50 %), or 44.84 N m/rad is 2.00 % stiffer than stated (50 %). The coefficients are "
         "averaged over both."
     )
-
-
-@pytest.mark.slow
-def test_a_third_spring_leaves_no_choice():
-    off = effect_from(NAME, {"spring_stiffness": 44.84, "error": 0.02})
-    study = investigate(campaign(off, conditions=(*CONDITIONS, (30.0, 0.0), (30.0, 25.0))), KINDS)
-    assert study.fitted == (NAME,)
-    assert choices(study.answer.hypothesis, misfit(study.nominal)) == ()
-    assert not study.answer.choices

@@ -21,7 +21,7 @@ from diagnosis.search.weigh import weigh
 from diagnosis.settings import Settings
 from tests.marks import slow
 from tests.support import gap_campaigns
-from tests.support.gap_campaigns import INTERVAL, nominal, whole_runs
+from tests.support.gap_campaigns import INTERVAL, added, nominal, whole_runs
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
 from tunnel_sim.effects.base import NEAR_MOTION
 
@@ -220,10 +220,8 @@ def test_an_effect_taken_out_leaves_the_fit_without_it():
     """With a phase in every run, which goes with its effect."""
     line = effect_from("second_mode", {"amplitude": 0.004, "frequency": 60.0, "damping_ratio": 0.005})
     base = nominal(campaign(line, effect_from("quadratic_damping", {"coefficient": 0.003})))
-    first = starting_points(base, effect_class("second_mode"))[0]
-    ringing = fit(first.problem, first.point, base=base)
-    second = starting_points(ringing, effect_class("quadratic_damping"))[0]
-    both = fit(second.problem, second.point, base=ringing)
+    ringing = added(base, "second_mode")
+    both = added(ringing, "quadratic_damping")
     assert list(both.problem.parameters.own_places) == ["second_mode"]
     pruned = prune(Hypothesis(("second_mode", "quadratic_damping"), both), [])
     (left,) = (one.fit for one in pruned if one.effects == ("quadratic_damping",))

@@ -308,7 +308,7 @@ def test_a_contact_that_yields_and_differs_by_direction_is_said_with_both_sizes(
 @pytest.mark.parametrize(
     ("seed", "share", "back", "kinds"),
     [
-        (70, 0.02, 0.3, ("coulomb_friction", "gravity_stiffness")),
+        slow(70, 0.02, 0.3, ("coulomb_friction", "gravity_stiffness")),
         slow(10, 0.05, 0.25, (*KINDS, "dropped_samples", "cubic_stiffness")),
         slow(10, 0.05, 0.25, None),
         slow(30, 0.05, 0.5, None),

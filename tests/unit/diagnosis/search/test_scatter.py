@@ -41,10 +41,8 @@ FEW = vocabulary(
     ["cubic_stiffness", "coulomb_friction", "spring_miscalibration", "stiffness_scatter", "damping_scatter"]
 )
 """What could be taken for scatter, where the whole vocabulary adds nothing but time."""
-PATTERNS = vocabulary(
-    ["reynolds_dependence", "spring_miscalibration", "nonlinear_yaw_moment", "cubic_stiffness", *SCATTERED]
-)
-"""What could be taken for scatter with the speed and the spring, and for no scatter."""
+PATTERNS = vocabulary(["reynolds_dependence", "spring_miscalibration", *SCATTERED])
+"""What could be taken for scatter with the speed and the spring."""
 SPRING, DAMPER = 5e-4, 1e-2  # one standard deviation between runs, relative
 STIFFNESS, DAMPED = "stiffness_scatter", "damping_scatter"
 

@@ -13,7 +13,7 @@ from diagnosis.compose import localise
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import linear_coefficients
-from diagnosis.likelihood.starting_points import nominal_start, starting_points
+from diagnosis.likelihood.starting_points import nominal_start
 from diagnosis.model.blocks import without_start
 from diagnosis.model.fact import Fact
 from diagnosis.search.investigate import nominal_study
@@ -31,7 +31,7 @@ from diagnosis.where.place import (
 from tests.marks import slow
 from tests.support import gap_campaigns
 from tests.support.driven_runs import driven
-from tests.support.gap_campaigns import INTERVAL, nominal, studied, with_blow
+from tests.support.gap_campaigns import INTERVAL, added, nominal, studied, with_blow
 from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.vocabulary.record import Record
 
@@ -92,10 +92,7 @@ def test_of_two_causes_the_one_that_closes_more_is_named():
     drift_too = 4e-4 * np.linspace(0.0, 1.0, round(DURATION / INTERVAL))
     data = campaign(strong, added=drift_too)
     base = nominal(data)
-    best = base
-    for name in ("quadratic_damping", "sensor_drift"):
-        start = starting_points(best, effect_class(name))[0]
-        best = fit(start.problem, start.point, base=best)
+    best = added(base, "quadratic_damping", "sensor_drift")
     where, _, _ = localise(studied(data, base, ("quadratic_damping", "sensor_drift"), best))
     assert where.channel == "damping"
 

@@ -164,12 +164,18 @@ ANSWERS: dict[str, tuple[Callable[[Campaign], object], str]] = {
 }
 
 
+@pytest.fixture(scope="module")
+def pendulum() -> Campaign:
+    return measured_campaign("rotary-pendulum")
+
+
+@pytest.mark.usefixtures("unexamined")
 @pytest.mark.parametrize("answer", ANSWERS)
-def test_a_wrong_answer_is_one_line(monkeypatch: pytest.MonkeyPatch, answer: str) -> None:
+def test_a_wrong_answer_is_one_line(monkeypatch: pytest.MonkeyPatch, pendulum: Campaign, answer: str) -> None:
     given, said = ANSWERS[answer]
     monkeypatch.setattr(Idle, "estimate", lambda _, campaign: given(campaign))
     with pytest.raises(WrongReturn, match=f"{said}.*check_estimator"):
-        identify(measured_campaign("rotary-pendulum"), Idle())
+        identify(pendulum, Idle())
 
 
 def test_the_covariance_of_coefficients_with_an_exact_one_is_accepted(

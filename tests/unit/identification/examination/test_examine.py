@@ -14,7 +14,6 @@ from identification.examination.examine import examine
 from identification.status import Outcome, Remark
 from tests.marks import slow
 from tests.support.decays import campaign, grid, reading, run, stated
-from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
 
 
@@ -23,17 +22,6 @@ def refused(data) -> Remark:
     (remark,) = examine(data).remarks
     assert remark.outcome is Outcome.REFUSED
     return remark
-
-
-def test_both_commands_refuse_alike():
-    data = stated(grid((16.0, 35.0), (0.0, 20.0)), "k16-v0", wind_speed=20.0, air_density=1.2)
-    data, said = stated(data, "k16-v20", wind_speed=0.0), []
-    for command in (lambda: identify(data, throw=False), lambda: diagnose(data)):
-        with pytest.raises(TunnelError) as caught:
-            command()
-        said.append(str(caught.value))
-    assert said[0] == said[1]
-    assert refused(data).what in said[0]
 
 
 def test_a_good_campaign_goes_through_as_it_is():
@@ -64,14 +52,6 @@ def test_speeds_of_one_setting_are_not_exchanged():
     data = campaign([run(r.id, r.spring_stiffness, actual.get(r.id, r.wind_speed)) for r in grid().runs])
     data = stated(stated(data, "k16-v15", wind_speed=14.85), "k35-v15", wind_speed=15.15)
     assert all(remark.outcome is not Outcome.REFUSED for remark in examine(data).remarks)
-
-
-def test_winds_exchanged_between_two_runs():
-    data = stated(grid(), "k16-v0", wind_speed=25.0, air_density=1.2)
-    data = stated(data, "k16-v25", wind_speed=0.0)
-    remark = refused(data)
-    assert set(remark.runs) == {"k16-v0", "k16-v25"}
-    assert "wind_speed" in remark.what
 
 
 @pytest.mark.parametrize("exchanged", [slow((0.0, 20.0)), (20.0, 25.0)])
@@ -155,15 +135,6 @@ def test_the_diagnosis_says_that_the_inertia_is_off():
     assert "looks like spring_stiffness in N mm/rad" in str(answer)
 
 
-def test_time_that_runs_backwards():
-    data = grid()
-    first = data.runs[0]
-    back = reading(first, first.record.yaw_rad[::-1])
-    remark = refused(replace(data, runs=(back, *data.runs[1:])))
-    assert remark.runs == ("k16-v0",)
-    assert "grows with the wind off" in remark.what
-
-
 def test_motion_may_grow_in_the_wind():
     one = run("r", 16.0, 20.0)
     assert examine(campaign([reading(one, one.record.yaw_rad[::-1])])).remarks == ()
@@ -180,11 +151,6 @@ def test_the_same_run_under_two_ids_is_counted_once():
     assert remark.runs == ("again",)
     assert "same samples as run k16-v0" in remark.what
     assert Estimate.from_json_dict(found.to_json_dict()) == found
-
-
-def test_one_file_for_runs_of_unlike_conditions():
-    one = run("a", 16.0, 0.0)
-    assert refused(campaign([one, replace(one, id="b", spring_stiffness=35.0)])).runs == ("a", "b")
 
 
 def test_all_runs_the_same_file():

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from tests.marks import slow
 from tests.support.linear import FORBIDDEN, linear_campaign
 from tests.unit.tunnel_lab.conftest import Tunnel
 
@@ -75,8 +76,14 @@ def test_import_identify_diagnose_report(tunnel: Tunnel, files: dict[Path, float
         assert not re.search(FORBIDDEN, text), re.findall(rf".{{0,40}}(?:{FORBIDDEN}).{{0,40}}", text)
 
 
-def test_a_shaken_and_a_pushed_cart_from_file_to_report(tunnel: Tunnel, tmp_path: Path) -> None:
-    """Driven by a force in N and by the acceleration of the base in g; SciPy's friction is found with its size."""
+@pytest.mark.parametrize(
+    ("heading", "per_newton"),
+    [("force (N)", 1.0), slow("base acceleration (g)", -1.0 / (MASS * 9.80665))],
+)
+def test_a_pushed_and_a_shaken_cart_from_file_to_report(
+    tunnel: Tunnel, tmp_path: Path, heading: str, per_newton: float
+) -> None:
+    """SciPy's friction is found with its size."""
     k, damping, friction, time = 50.0, 0.3, 0.05, np.arange(3000) / 100.0
     wave = np.sin(2.0 * np.pi * (0.2 + 0.03 * time) * time)
 
@@ -92,30 +99,29 @@ def test_a_shaken_and_a_pushed_cart_from_file_to_report(tunnel: Tunnel, tmp_path
         )
 
     rng = np.random.default_rng(8)
-    for heading, per_newton in (("force (N)", 1.0), ("base acceleration (g)", -1.0 / (MASS * 9.80665))):
-        files = [tmp_path / f"{heading[:5].strip()}{place}.csv" for place in (1, 2)]
-        for path, peak in zip(files, (1.5, 0.7), strict=True):
-            x = 1e3 * (moved(peak * wave) + 3e-5 * rng.standard_normal(time.size))
-            table = np.stack([time, x, peak * per_newton * wave], axis=1)
-            np.savetxt(path, table, "%.8g", ",", header=f"time (s),x (mm),{heading}", comments="")
-        cart, answer = tmp_path / heading[:5].strip(), tmp_path / f"{heading[:5]}.json"
-        stated = ("--set", f"mass={MASS}", "--set", f"spring_stiffness={k}", "--input-hold", "linear")
-        status, printed, _ = tunnel("import", *files, "--out", cart, *stated, "--yes")
-        assert status == 0
-        shown = [printed.replace(str(tmp_path), "")]
-        status, printed, _ = tunnel("diagnose", cart, "--json", answer, "--effects", KINDS)
-        assert status == 0
-        shown.append(printed)
-        document = json.loads(answer.read_text())
-        assert document["causes"] == ["coulomb_friction"]
-        found = document["candidates"][0]["parameters"]["friction_moment"]
-        assert found["unit"] == "N"
-        assert found["value"] == pytest.approx(friction, rel=0.005)
-        after = document["coefficients"]["after"]
-        assert after["yaw_inertia"]["value"] == pytest.approx(MASS, rel=0.002)
-        assert after["mechanical_damping"]["value"] == pytest.approx(damping, rel=0.02)
-        for text in shown:
-            assert not re.search(FORBIDDEN, text), re.findall(rf".{{0,40}}(?:{FORBIDDEN}).{{0,40}}", text)
+    files = [tmp_path / f"{heading[:5].strip()}{place}.csv" for place in (1, 2)]
+    for path, peak in zip(files, (1.5, 0.7), strict=True):
+        x = 1e3 * (moved(peak * wave) + 3e-5 * rng.standard_normal(time.size))
+        table = np.stack([time, x, peak * per_newton * wave], axis=1)
+        np.savetxt(path, table, "%.8g", ",", header=f"time (s),x (mm),{heading}", comments="")
+    cart, answer = tmp_path / heading[:5].strip(), tmp_path / f"{heading[:5]}.json"
+    stated = ("--set", f"mass={MASS}", "--set", f"spring_stiffness={k}", "--input-hold", "linear")
+    status, printed, _ = tunnel("import", *files, "--out", cart, *stated, "--yes")
+    assert status == 0
+    shown = [printed.replace(str(tmp_path), "")]
+    status, printed, _ = tunnel("diagnose", cart, "--json", answer, "--effects", KINDS)
+    assert status == 0
+    shown.append(printed)
+    document = json.loads(answer.read_text())
+    assert document["causes"] == ["coulomb_friction"]
+    found = document["candidates"][0]["parameters"]["friction_moment"]
+    assert found["unit"] == "N"
+    assert found["value"] == pytest.approx(friction, rel=0.005)
+    after = document["coefficients"]["after"]
+    assert after["yaw_inertia"]["value"] == pytest.approx(MASS, rel=0.002)
+    assert after["mechanical_damping"]["value"] == pytest.approx(damping, rel=0.02)
+    for text in shown:
+        assert not re.search(FORBIDDEN, text), re.findall(rf".{{0,40}}(?:{FORBIDDEN}).{{0,40}}", text)
 
 
 def test_a_unit_of_length_makes_a_displacement(

@@ -229,10 +229,10 @@ def test_a_folder_of_records_gets_the_command_that_imports_it(
     assert "--out 'day 1-campaign' --calibration \"a + b*V\"; it asks: " in tunnel("diagnose", "day 1")[2]
 
 
-@pytest.mark.parametrize("name", ["xGyro", "gyro_z", "YawRate", "Winkelgeschwindigkeit", "theta_dot"])
 def test_a_column_named_as_a_rate_without_a_unit_is_asked_for_its_unit(
-    tunnel: Tunnel, tmp_path: Path, name: str
+    tunnel: Tunnel, tmp_path: Path
 ) -> None:
+    name = "Winkelgeschwindigkeit"
     time, angle = decay(amplitude=30.0)
     rows = "".join(f"{1e3 * t:.0f},{value:.4f}\n" for t, value in zip(time, angle, strict=True))
     path = written(tmp_path, "imu.csv", f"Time,{name}\n{rows}")

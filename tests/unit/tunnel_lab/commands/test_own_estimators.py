@@ -165,14 +165,6 @@ def test_score_takes_it_into_its_processes(tunnel) -> None:
 
 
 @pytest.mark.usefixtures("folder")
-def test_one_that_leaves_the_program_is_counted_as_a_failure(tunnel) -> None:
-    status, out, err = tunnel("score", "--jobs", "0", "grid.toml", "-e", "own_method:Leaves")
-    assert status == 0
-    assert " leaves " in out
-    assert "leaves raised an exception 4 times; counted as failures. The first:" in err
-
-
-@pytest.mark.usefixtures("folder")
 def test_one_that_leaves_the_program_ends_identify_with_one(tunnel, tiny_campaign: Path) -> None:
     status, out, err = tunnel("identify", tiny_campaign, "-e", "own_method:Leaves")
     assert (status, out) == (1, "")
@@ -211,7 +203,9 @@ def test_what_a_class_does_not_give_is_not_a_failure(tunnel) -> None:
     assert given >= {("bare", "ωn"), ("mine", "ωn"), ("mine", "ζ")}
     assert ("bare", "ζ") not in given
     assert "Not given by bare: ζ.\n" in out
-    status, out, _ = tunnel(*score[:-1], "own_method:Leaves")
+    status, out, err = tunnel(*score[:-1], "own_method:Leaves")
+    assert status == 0
+    assert "leaves raised an exception 4 times; counted as failures. The first:" in err
     assert "Not given" not in out
     assert out.count(" 4/4") == 2
 
@@ -352,27 +346,29 @@ def test_a_driven_run_goes_to_a_class_that_takes_it() -> None:
     assert "driven" in estimators.estimators_of_driven_runs()
 
 
-@pytest.mark.parametrize(
-    ("word", "said"),
-    [
-        ("own_method:Nine", "own_method:Nine: cannot be loaded (AttributeError: module 'own_method' has no"),
-        (
-            "gone_module:Mine",
-            "gone_module:Mine: cannot be loaded (ModuleNotFoundError: No module",
-        ),
-        (
-            "own_method.py:Mine",
-            "own_method.py:Mine: names a file, not a module; leave out .py: own_method:Mine",
-        ),
-        ("own_method:", "own_method:: names no class; give it as module:Class"),
-        (":Mine", ":Mine: names no module; give it as module:Class"),
-        ("own_method:one_of", "is not a class of an estimator; state a name and a method estimate"),
-        ("own_method:Loud", "estimator loud: cannot be made without arguments (TypeError"),
-        ("min", "there is no estimator 'min'; use one of"),
-        ("hilbrt", "did you mean 'hilbert', or give module:Class of your own"),
-    ],
+BAD_WORDS = (
+    ("own_method:Nine", "own_method:Nine: cannot be loaded (AttributeError: module 'own_method' has no"),
+    (
+        "gone_module:Mine",
+        "gone_module:Mine: cannot be loaded (ModuleNotFoundError: No module",
+    ),
+    (
+        "own_method.py:Mine",
+        "own_method.py:Mine: names a file, not a module; leave out .py: own_method:Mine",
+    ),
+    ("own_method:", "own_method:: names no class; give it as module:Class"),
+    (":Mine", ":Mine: names no module; give it as module:Class"),
+    ("own_method:one_of", "is not a class of an estimator; state a name and a method estimate"),
+    ("own_method:Loud", "estimator loud: cannot be made without arguments (TypeError"),
+    ("min", "there is no estimator 'min'; use one of"),
+    ("hilbrt", "did you mean 'hilbert', or give module:Class of your own"),
 )
-@pytest.mark.parametrize("command", ["identify", "score", "sweep"])
+
+
+@pytest.mark.parametrize(
+    ("command", "word", "said"),
+    [*(("identify", *one) for one in BAD_WORDS), *((other, *BAD_WORDS[-1]) for other in ("score", "sweep"))],
+)
 def test_a_bad_word_is_one_line(
     tunnel, folder: Path, tiny_campaign: Path, command: str, word: str, said: str
 ) -> None:

@@ -356,20 +356,6 @@ def test_many_in_processes_of_their_own_are_the_same():
     np.testing.assert_array_equal(results[0][1], results[1][1])
 
 
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::DeprecationWarning")
-def test_a_video_can_be_recorded(tmp_path):
-    env = gym.wrappers.RecordVideo(
-        make(**SHORT, max_runs=2, render_mode="rgb_array"), str(tmp_path / "films")
-    )
-    env.reset(seed=0)
-    env.step(OFF)
-    env.step(ON)
-    env.close()
-    (film,) = (tmp_path / "films").glob("*.mp4")
-    assert film.stat().st_size > 1000
-
-
 WIDE = {"wind_speed": 0.02, "spring_stiffness": 0.01, "mechanical_damping": 0.1, "zero": 0.003}
 DRIFTS = {"spring_stiffness_drift": 0.05, "wind_speed_drift_between_runs": -0.04}
 

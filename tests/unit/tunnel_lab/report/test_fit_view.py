@@ -12,12 +12,10 @@ import pytest
 
 from diagnosis.compose import localise
 from diagnosis.findings.fit_view import fit_figure, fit_pages
-from diagnosis.likelihood.least_squares import fit
-from diagnosis.likelihood.starting_points import starting_points
 from tests.support.diagnosis_document import findings_of
-from tests.support.gap_campaigns import campaign, nominal, studied
+from tests.support.gap_campaigns import added, campaign, nominal, studied
 from tunnel_lab.report.charts import fit_charts
-from tunnel_sim.effects import effect_class, effect_from
+from tunnel_sim.effects import effect_from
 from tunnel_sim.vocabulary.errors import TunnelError
 
 Document = dict[str, Any]
@@ -97,8 +95,7 @@ def test_no_maps_no_fit(given: Document) -> None:
 def test_the_document_holds_the_records_and_the_cycles_where_the_models_differ() -> None:
     data = campaign(effect_from(CAUSE, {"coefficient": 0.003}))
     base = nominal(data)
-    lead = starting_points(base, effect_class(CAUSE))[0]
-    best = fit(lead.problem, lead.point, base=base)
+    best = added(base, CAUSE)
     _, maps, _ = localise(studied(data, base, (CAUSE,), best))
     assert {trace.id for trace in maps.traces} == {run.id for run in data.runs}
     records = {run.id: run.record for run in data.runs}

@@ -108,6 +108,7 @@ def test_the_default_has_something_to_control() -> None:
     assert sum(still) != sum(moved)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("preset", PRESETS)
 def test_stable_baselines_checker_passes_without_a_warning(preset: str) -> None:
     from stable_baselines3.common.env_checker import check_env as check_for_stable_baselines

@@ -70,10 +70,10 @@ def test_a_rate_limit_follows_its_equation(
     asked, short = InputSamples(time, values, held), 2e-5
     fine = np.arange(time[0], time[-1], short)
     wanted = at(asked, fine + 0.5 * short)
-    exact = np.empty_like(fine)
-    exact[0] = values[0]
-    for k in range(1, fine.size):
-        exact[k] = exact[k - 1] + np.clip(wanted[k - 1] - exact[k - 1], -rate * short, rate * short)
+    steps, most = [float(values[0])], rate * short
+    for goal in wanted[:-1].tolist():
+        steps.append(steps[-1] + min(max(goal - steps[-1], -most), most))
+    exact = np.array(steps)
     found = asked.at_rate(rate)
     assert np.all(np.diff(found.time_s) > 0.0)
     away = np.abs(at(found, fine) - exact)

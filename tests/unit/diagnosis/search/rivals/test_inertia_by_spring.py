@@ -45,7 +45,7 @@ def decays(
 
 
 def test_an_inertia_that_differs_by_spring_is_unknown_and_said_with_its_size() -> None:
-    found = diagnose(decays(BY_SPRING), kinds=KINDS)
+    found = diagnose(decays(BY_SPRING), kinds=KINDS[::2])
     assert tuple(found.causes) == UNKNOWN
     assert "An inertia that differs from spring to spring would explain the gap: −0.33" in found.verdict
     assert "Two springs" not in found.verdict  # these leave much more
@@ -57,7 +57,7 @@ def test_without_the_rival_it_takes_a_false_name() -> None:
 
 
 def test_a_spring_that_is_not_as_stiff_as_stated_keeps_its_name() -> None:
-    found = diagnose(decays(dict.fromkeys(BY_SPRING, 0.0), {28.3: 0.005}), kinds=KINDS)
+    found = diagnose(decays(dict.fromkeys(BY_SPRING, 0.0), {28.3: 0.005}), kinds=KINDS[::2])
     assert tuple(found.causes) == ("spring_miscalibration",)
 
 

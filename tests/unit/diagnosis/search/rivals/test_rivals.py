@@ -13,7 +13,6 @@ from diagnosis.likelihood.residuals import misfit
 from diagnosis.model.fact import as_stated
 from diagnosis.search.answer import UNKNOWN
 from diagnosis.search.hypothesis import Hypothesis
-from diagnosis.search.investigate import investigate
 from diagnosis.search.rivals.rival import Rival
 from diagnosis.search.rivals.two_springs import AnotherSpring, TwoSprings
 from diagnosis.search.weigh import weigh
@@ -42,7 +41,7 @@ def two_off():
 
 def test_two_springs_off_are_unknown_and_said_in_words(two_off):
     kept = {(run.spring_stiffness, run.wind_on): run for run in two_off.runs}  # enough to tell the springs
-    found = diagnose(replace(two_off, runs=tuple(kept.values())), kinds=KINDS)
+    found = diagnose(replace(two_off, runs=tuple(kept.values())), kinds=KINDS[::2])
     assert tuple(found.causes) == UNKNOWN
     stated = sorted({run.spring_stiffness for run in two_off.runs})
     assert "Two springs that are not as stiff as stated would explain the gap: for example, " in found.verdict
@@ -122,14 +121,12 @@ def one_run_off():
 
 def test_a_rival_of_ones_own_is_weighed_counts_for_unknown_and_is_said():
     kinds = [effect_class(name) for name in ("quadratic_damping", "spring_miscalibration")]
-    with_rival, without = (investigate(one_run_off(), kinds, rivals=one) for one in ((OneRunOff(),), ()))
-    (found,) = with_rival.rivals
-    (hypothesis,) = found.hypotheses
-    assert hypothesis.effects == ("spring of r4",)
-    assert hypothesis.fit.excess < 0.01 * with_rival.nominal.excess
-    assert hypothesis.names not in [answer.effects for answer in with_rival.answers]
-    before, after = (study.of(UNKNOWN).probability for study in (without, with_rival))
+    without, said = (diagnose(one_run_off(), kinds=kinds, rivals=one) for one in ((), (OneRunOff(),)))
+    names = [candidate.effect for candidate in said.candidates]
+    assert "spring of r4" not in names
+    before, after = (
+        one.probability for found in (without, said) for one in found.candidates if one.effect == UNKNOWN[0]
+    )
     assert before < 0.15  # the other springs explain the gap as well; one run alone shows which
     assert 0.4 < after < 0.6
-    said = diagnose(one_run_off(), kinds=kinds, rivals=(OneRunOff(),))
     assert said.verdict.endswith("The spring of r4 would explain the gap: measure it again.")

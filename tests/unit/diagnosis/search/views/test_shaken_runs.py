@@ -41,12 +41,21 @@ def shaken(*names: str) -> Campaign:
 
 
 @pytest.mark.parametrize(
-    "names", [(STREAM, SPRING), slow((SPRING,)), slow((SURROUNDINGS, FRICTION)), slow((FRICTION,))]
+    ("names", "others"),
+    [
+        ((STREAM, SPRING), (SURROUNDINGS,)),
+        slow((STREAM, SPRING), (SURROUNDINGS, FRICTION)),
+        slow((SPRING,), (FRICTION, STREAM, SURROUNDINGS)),
+        slow((SURROUNDINGS, FRICTION), (SPRING, STREAM)),
+        slow((FRICTION,), (SPRING, STREAM, SURROUNDINGS)),
+    ],
 )
-def test_a_moment_is_named_after_stretches_where_there_is_one(names: tuple[str, ...]) -> None:
+def test_a_moment_is_named_after_stretches_where_there_is_one(
+    names: tuple[str, ...], others: tuple[str, ...]
+) -> None:
     data = shaken(*names)
     assert loses_phase(nominal(data))
-    study = investigate(data, KINDS)
+    study = investigate(data, tuple(map(effect_class, (*names, *others))))
     assert study.causes == tuple(sorted(names))
     fit = in_its_noise(study)
     assert fit is not None

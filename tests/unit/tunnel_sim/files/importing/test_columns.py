@@ -135,7 +135,9 @@ def test_many_columns_are_counted_where_they_are_listed() -> None:
 @pytest.mark.parametrize(
     ("name", "kind"),
     [
-        ("ZGyro", "rate"), ("gyrox", "rate"), ("AngularVelocity", "rate"), ("Drehrate", "rate"), ("θ̇", "rate"),
+        ("ZGyro", "rate"), ("gyrox", "rate"), ("xGyro", "rate"), ("gyro_z", "rate"),
+        ("YawRate", "rate"), ("theta_dot", "rate"), ("Winkelgeschwindigkeit", "rate"),
+        ("AngularVelocity", "rate"), ("Drehrate", "rate"), ("θ̇", "rate"),
         ("ω", "rate"), ("accX", "acceleration"), ("Winkelbeschleunigung", "acceleration"), ("θ̈", "acceleration"),
         ("theta_ddot", "acceleration"),
         ("theta", ""), ("rotation", ""), ("anecdote", ""), ("generated", ""), ("accuracy", ""), ("accumulated", ""),

@@ -56,6 +56,14 @@ HEADINGS = {
     "s": ("s", "s"),
     "°": ("°", "deg"),
     "time_min": ("time", "min"),
+    "yaw_deg": ("yaw", "deg"),
+    "yaw_rate_rad_s": ("yaw_rate", "rad/s"),
+    "omega_n_rad_per_s": ("omega_n", "rad/s"),
+    "gyro_z [°/s]": ("gyro_z", "deg/s"),
+    "wind speed m/s": ("wind speed", "m/s"),
+    "F N/s": ("F", "N/s"),
+    "Winkel [Inkr.]": ("Winkel", "counts"),
+    "Angle, Ch 1+2 (rad) Run #1": ("Angle, Ch 1+2 Run #1", "rad"),
     "Winkel/Grad Run 1": ("Winkel Run 1", "deg"),
     # Units that are not known are kept as they are written.
     "angle [grad]": ("angle [grad]", "grad"),
@@ -63,6 +71,8 @@ HEADINGS = {
     "angle in arcmin": ("angle", "arcmin"),
     "Weg mm/s": ("Weg", "mm/s"),
     "Temperatur in Grad": ("Temperatur", "°C"),
+    "Output Current (A)": ("Output Current (A)", "A"),
+    "Kraft [daN/s]": ("Kraft [daN/s]", "daN/s"),
     # Words that are not units.
     "min": ("min", ""),
     "V": ("V", ""),
@@ -73,6 +83,7 @@ HEADINGS = {
     "Zeit/Run": ("Zeit/Run", ""),
     "Zeit/Run 1": ("Zeit/Run 1", ""),
     "Dev1/ai0": ("Dev1/ai0", ""),
+    "data[1]": ("data[1]", ""),
     "Position in tunnel axis": ("Position in tunnel axis", ""),
     "flow_kg_s": ("flow_kg_s", ""),
 }
@@ -84,9 +95,9 @@ def test_a_heading_states_its_unit(heading: str) -> None:
 
 
 def test_the_german_degree_is_a_degree_and_the_gon_is_not() -> None:
-    assert [known_unit(text) for text in ("Grad", "[Grad]", "Grad/s", "grad", "gon", "Neugrad")] == [
-        "deg", "deg", "deg/s", None, "gon", "gon",
-    ]  # fmt: skip
+    known = {"Grad": "deg", "[Grad]": "deg", "Grad/s": "deg/s", "grad": None, "gon": "gon", "Neugrad": "gon"}
+    known |= {"[°]": "deg", "µs": "us", "Degrees": "deg", "N m": None, "rad/s²": "rad/s2"}
+    assert {text: known_unit(text) for text in known} == known
     assert UNITS["angle"]["gon"] == pytest.approx(2.0 * np.pi / 400.0)
 
 
@@ -143,8 +154,14 @@ def test_a_temperature_in_degrees_is_not_an_angle(tmp_path: Path) -> None:
     np.testing.assert_allclose(read_records([path]).campaign.runs[0].record.yaw_rad, angle, atol=1e-9)
 
 
-@pytest.mark.parametrize("kind", ["h5", "mat", "mat 7.3", "tdms", "csv", "parquet", "xlsx"])
-@pytest.mark.parametrize("name", ["run", "Lauf", "drive_hold"])
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [
+        *((kind, "run") for kind in ("h5", "mat", "mat 7.3", "tdms", "csv", "parquet", "xlsx")),
+        ("csv", "Lauf"),
+        ("csv", "drive_hold"),
+    ],
+)
 def test_a_table_of_nothing_but_names_of_runs_is_refused_in_one_line(
     kind: str, name: str, tmp_path: Path
 ) -> None:

@@ -18,7 +18,6 @@ from tunnel_sim.files.importing.formats.layout import facts_in
 from tunnel_sim.files.importing.formats.text import find_dialect
 from tunnel_sim.files.importing.records import read_records
 from tunnel_sim.files.importing.tables import Channel, Table
-from tunnel_sim.files.importing.units import known_unit, split_unit
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -52,39 +51,6 @@ def test_the_dialect_of_some_lines(lines: list[str], delimiter: str, decimal: st
     found = find_dialect(lines, ImportChoices())
     assert found is not None
     assert (found.delimiter, found.decimal, found.width) == (delimiter, decimal, width)
-
-
-@pytest.mark.parametrize(
-    ("heading", "name", "unit"),
-    [
-        ("Angle, Ch 1+2 (rad) Run #1", "Angle, Ch 1+2 Run #1", "rad"),
-        ("yaw_deg", "yaw", "deg"),
-        ("t / ms", "t", "ms"),
-        ("gyro_z [°/s]", "gyro_z", "deg/s"),
-        ("Output Current (A)", "Output Current (A)", "A"),
-        ("data[1]", "data[1]", ""),
-        ("angle", "angle", ""),
-        ("yaw_rate_rad_s", "yaw_rate", "rad/s"),
-        ("omega_n_rad_per_s", "omega_n", "rad/s"),
-        ("V [m/s]", "V", "m/s"),
-        ("v / (km/h)", "v", "km/h"),
-        ("wind speed m/s", "wind speed", "m/s"),
-        ("m/s", "m/s", "m/s"),
-        ("t/s", "t", "s"),
-        ("F N/s", "F", "N/s"),
-        ("flow_kg_s", "flow_kg_s", ""),
-        ("Kraft [daN/s]", "Kraft [daN/s]", "daN/s"),
-        ("Winkel [Inkr.]", "Winkel", "counts"),
-    ],
-)
-def test_names_and_units(heading: str, name: str, unit: str) -> None:
-    assert split_unit(heading) == (name, unit)
-
-
-def test_units_have_many_spellings() -> None:
-    assert [known_unit(text) for text in ("[°]", "µs", "Degrees", "N m", "rad/s²")] == [
-        "deg", "us", "deg", None, "rad/s2",
-    ]  # fmt: skip
 
 
 def test_runs_side_by_side_have_their_own_times_and_lengths(tmp_path: Path) -> None:
