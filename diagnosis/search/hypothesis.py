@@ -211,8 +211,11 @@ class Scale:
         return self._log_weight(np.zeros(6), hypothesis, effects=1, scatter_cost=cost)
 
     def with_form(self, hypothesis: Hypothesis) -> float:
-        """Logarithm of the weight of the set with one more form and no residual."""
-        cost = hypothesis.fit.scatter_cost(self.deviation_precision)
+        """Logarithm of the weight of the set with one more form and no residual.
+
+        Deviations of the runs may be as wide as they are because they follow the error of the textbook form.
+        """
+        cost = min(hypothesis.fit.scatter_cost(self.deviation_precision), self.scatter_cost)
         return self._log_weight(np.zeros(6), hypothesis, numbers=1, scatter_cost=cost)
 
     def _log_weight(
