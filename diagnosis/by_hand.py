@@ -13,8 +13,9 @@ from diagnosis.diagnosable import comparable_runs, diagnosable
 from diagnosis.findings.candidates import candidates
 from diagnosis.findings.next_run import NextRun
 from diagnosis.likelihood.least_squares import Fit, FitError, fit
+from diagnosis.likelihood.part_of_fit import restricted
 from diagnosis.search.answer import Answer
-from diagnosis.search.hypothesis import Hypothesis, polish, restricted
+from diagnosis.search.hypothesis import Hypothesis, polish
 from diagnosis.search.investigate import nominal_study
 from diagnosis.settings import Settings
 from identification.show.numbers import plain

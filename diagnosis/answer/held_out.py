@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from diagnosis.likelihood.least_squares import Fit, FitError, try_fit
+from diagnosis.likelihood.part_of_fit import restricted
 from diagnosis.likelihood.partial import fit_seen, refit_releases
 from diagnosis.likelihood.residuals import resonance
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.data import FOLDS, folds
 from diagnosis.model.parameters import Point
-from diagnosis.search.hypothesis import restricted
 from diagnosis.search.prepared import COARSE_STEP, HUM
 from diagnosis.search.process_noise import MomentLayer
 from diagnosis.search.scatter import with_scatter, without_deviations

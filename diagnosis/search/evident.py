@@ -10,8 +10,9 @@ import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, try_fit
 from diagnosis.likelihood.normal_equations import by_run
+from diagnosis.likelihood.part_of_fit import restricted
 from diagnosis.search.grow import MOST_CAUSES
-from diagnosis.search.hypothesis import Hypothesis, restricted
+from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.one_more import sets_with_one_more
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.capabilities import Periodic

@@ -13,6 +13,7 @@ import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, scaled_residuals, try_fit
 from diagnosis.likelihood.other_minima import deepest
+from diagnosis.likelihood.part_of_fit import sought_again
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, linear_coefficients, misfit, resonance
 from diagnosis.model.parameters import Point
@@ -288,33 +289,6 @@ def turned_back(fitted: Fit) -> Fit:
     return fitted if turned is None or turned.total >= greatest else turned
 
 
-def restricted(whole: Fit, names: Collection[str]) -> Fit:
-    """A fit with only the named effects; everything else, with the residuals, comes from the whole fit.
-
-    Returns:
-        A start, with its sensitivities, for the fit of the smaller problem.
-    """
-    large = whole.problem
-    problem = Problem(
-        large.data,
-        tuple(kind for kind in large.effects if kind.name in names),
-        tuple((name, value) for name, value in large.fixed if name.split(".")[0] in names),
-        tuple(name for name in large.free_forms if name.split(".")[0] in names),
-        large.instants,
-        large.scatter,
-        large.resolve_rod_mode,
-    )
-    common = [large.names.index(name) for name in problem.names]
-    own = [large.parameters.own_names.index(name) for name in problem.parameters.own_names]
-    return dataclasses.replace(
-        whole,
-        problem=problem,
-        point=Point(whole.point.common[common], whole.point.per_run[:, own]),
-        covariance=whole.covariance[np.ix_(common, common)],
-        jacobian=[(c[:, common], r[:, own]) for c, r in whole.jacobian],
-    )
-
-
 def with_forms(
     found: Sequence[Hypothesis], gap: ChannelMisfit, least: float, count: int = FREED_HYPOTHESES
 ) -> list[Hypothesis]:
@@ -478,7 +452,10 @@ def _explains_more(together: Fit, alone: Fit) -> bool:
 
 
 def _free_forms(fitted: Fit, forms: Collection[Form], tolerance: float = 1e-4) -> Fit | None:
-    """The same effects with only some forms free; None if no form is free, or there is no gain."""
+    """The same effects with only some forms free; None if no form is free, or there is no gain.
+
+    Instants and phases are sought again: beside the textbook form they may follow its error.
+    """
     problem = fitted.problem
     if not forms:
         return None
@@ -487,6 +464,7 @@ def _free_forms(fitted: Fit, forms: Collection[Form], tolerance: float = 1e-4) -
     defaults = {f"{k.name}.{i.name}": i.form_start for k in problem.effects for i in k.parameters() if i.form}
     start = Point(np.array([(defaults | values)[name] for name in freed.names]), fitted.point.per_run)
     found = try_fit(freed, start, tolerance=tolerance)
+    found = None if found is None else sought_again(found)
     if found is None or not any(found.std(name) > 0.0 for name in freed.names if name not in values):
         return None  # also if the runs determine no form
     return found if found.total < fitted.total and is_plausible(found) else None

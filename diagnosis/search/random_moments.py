@@ -17,14 +17,13 @@ from scipy.special import fdtrc
 
 from diagnosis.likelihood.ceiling import Unexplained
 from diagnosis.likelihood.least_squares import Fit, FitError, fit, fit_at, try_fit
+from diagnosis.likelihood.part_of_fit import restricted, sought_again
 from diagnosis.likelihood.paths import COMMON
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, gap_left, misfit
-from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.data import Data
-from diagnosis.model.parameters import Point
 from diagnosis.search.evident import evident, needed
 from diagnosis.search.grow import grow
-from diagnosis.search.hypothesis import Hypothesis, Scale, of_more_weight, restricted
+from diagnosis.search.hypothesis import Hypothesis, Scale, of_more_weight
 from diagnosis.search.one_more import sets_with_one_more
 from diagnosis.search.process_noise import (
     MomentLayer,
@@ -41,7 +40,7 @@ from diagnosis.search.scatter import differing, with_likeliest_widths, without_d
 from diagnosis.search.steady_noise import is_a_line, is_slow, is_steady_noise
 from diagnosis.search.weights import FittedSet, log_weight
 from tunnel_sim.effects import Effect
-from tunnel_sim.effects.capabilities import AtRandom, OwnNumbers
+from tunnel_sim.effects.capabilities import AtRandom
 
 ALIKE_WITHIN: Final = 20.0
 """Difference of −2 ln L below which two kinds of random moment explain the residuals equally well, in χ².
@@ -420,7 +419,7 @@ def _settled(
             # a random moment leaves little of a gap for comparing effects where it acts: more are added while one
             # seen there alone is evident, the most evident of all, so that none absorbs the residual of another
             exchanges |= _exchanges([found, *sets])
-            top = needed(_sought_again(found))
+            top = needed(replace(found, fit=sought_again(found.fit)))
             further = evident(top, kinds)
             while any(h.effects[-1] in hidden for h in further):
                 top, exchanges = further[0], exchanges | _exchanges(further)
@@ -440,31 +439,6 @@ def _in_noise_of(base: Fit, known: Hypothesis) -> list[Hypothesis]:
     problem = replace(known.fit.problem, data=base.problem.data)
     fitted = try_fit(problem, known.fit.point) if known.effects else None
     return [] if fitted is None else [Hypothesis(known.effects, with_likeliest_widths(fitted))]
-
-
-def _sought_again(hypothesis: Hypothesis) -> Hypothesis:
-    """The set after a second search for instants and phases; each run keeps those with the smaller residual.
-
-    They were first found before the other effects were known.
-    """
-    known = hypothesis.fit
-    for kind in known.problem.effects:
-        if not issubclass(kind, OwnNumbers):
-            continue
-        others = restricted(known, {other.name for other in known.problem.effects} - {kind.name})
-        start = next(iter(starting_points(fit_at(others.problem, others.point), kind)), None)
-        if start is None:
-            continue
-        sought = fit(start.problem, start.point)
-        tried = [known, sought]
-        if sought.point.per_run.shape == known.point.per_run.shape:  # else the number of instants differs
-            release = sought.point.per_run.copy()
-            kept = known.chi2 < sought.chi2
-            old, new = (f.problem.parameters.own_places[kind.name] for f in (known, sought))
-            release[kept, new] = known.point.per_run[kept, old]
-            tried.append(fit(sought.problem, Point(sought.point.common, release)))
-        known = min(tried, key=lambda f: f.total)
-    return replace(hypothesis, fit=known)
 
 
 def _seen_in(hypothesis: Hypothesis, data: Data) -> Hypothesis:

@@ -11,11 +11,12 @@ from typing import Final
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, FitError, fit, scaled_residuals, try_fit
+from diagnosis.likelihood.part_of_fit import restricted
 from diagnosis.likelihood.residuals import misfit
 from diagnosis.model.fact import Fact
 from diagnosis.search.answer import UNKNOWN, Answer
 from diagnosis.search.clock import StepClock
-from diagnosis.search.hypothesis import Hypothesis, restricted, with_forms
+from diagnosis.search.hypothesis import Hypothesis, with_forms
 from diagnosis.search.one_more import same_change, sets_with_one_more
 from diagnosis.search.rivals.rival import FoundRival, Rival
 from diagnosis.search.runs_in_view import RunsInView

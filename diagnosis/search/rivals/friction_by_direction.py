@@ -22,11 +22,12 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from diagnosis.likelihood.least_squares import Fit, try_fit
+from diagnosis.likelihood.part_of_fit import restricted
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.fact import Fact, as_stated
 from diagnosis.model.parameters import Point
 from diagnosis.model.similarity import Similarity
-from diagnosis.search.hypothesis import Hypothesis, restricted
+from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.rivals.rival import Rival, explains_all, explains_more
 from identification.show.numbers import percent, plain, with_std
 from tunnel_sim.effects import Effect

@@ -15,11 +15,12 @@ from typing import Any, Final
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, try_fit
+from diagnosis.likelihood.part_of_fit import restricted
 from diagnosis.likelihood.residuals import CHANNELS
 from diagnosis.model.fact import Fact, as_stated
 from diagnosis.model.parameters import Point
 from diagnosis.model.similarity import Similarity
-from diagnosis.search.hypothesis import Hypothesis, restricted
+from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.rivals.rival import Rival, explains_all, explains_more
 from diagnosis.search.rivals.two_springs import ONE_SPRING, SpringError, differs_by_spring
 from diagnosis.search.scatter import without_deviations

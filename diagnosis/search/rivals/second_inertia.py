@@ -16,13 +16,14 @@ from typing import Any, ClassVar, Final, Self
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, scaled_residuals, try_fit
+from diagnosis.likelihood.part_of_fit import restricted
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import project_out
 from diagnosis.model.fact import Fact, as_stated
 from diagnosis.model.parameters import Point
 from diagnosis.model.run_data import RunData
 from diagnosis.model.similarity import Similarity
-from diagnosis.search.hypothesis import Hypothesis, restricted
+from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.rivals.rival import Rival, explains_all, explains_more
 from identification.show.numbers import for_people, plain
 from tunnel_sim.effects import Effect

@@ -15,9 +15,10 @@ from typing import Any, Final
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, try_fit
+from diagnosis.likelihood.part_of_fit import restricted
 from diagnosis.model.fact import Fact, as_stated
 from diagnosis.model.similarity import Similarity
-from diagnosis.search.hypothesis import Hypothesis, restricted
+from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.one_more import sets_with_one_more
 from diagnosis.search.rivals.rival import Rival
 from identification.show.numbers import for_people, plain

@@ -12,11 +12,12 @@ from typing import ClassVar, Final, Self
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, try_fit
+from diagnosis.likelihood.part_of_fit import restricted
 from diagnosis.likelihood.residuals import misfit
 from diagnosis.model.data import Data
 from diagnosis.model.similarity import REFERENCE_FREQUENCY
 from diagnosis.search.clock import StepClock
-from diagnosis.search.hypothesis import Hypothesis, converged, polish, restricted
+from diagnosis.search.hypothesis import Hypothesis, converged, polish
 from diagnosis.search.one_more import sets_with_one_more
 from diagnosis.search.prepared import Prepared
 from diagnosis.search.sets import Sets
