@@ -348,3 +348,16 @@ def test_a_line_that_does_not_decay_is_no_mode() -> None:
         for r in ratios
     ]
     assert [mode.plausible(12.0, 60.0) for mode in modes] == [False, True, True]
+
+
+def test_instants_are_sought_again_beside_a_form() -> None:
+    """Beside friction without presliding, further instants follow the error of its frequency."""
+    friction = effect_from("coulomb_friction", {"friction_moment": 0.003, "presliding": 0.008})
+    lost = effect_from("dropped_samples", {"lost_time": 0.002})
+    base = nominal(gap_campaigns.campaign(friction, lost))
+    found = grow(whole_runs(base, [type(friction), type(lost)]))[0]
+    assert found.names == ("coulomb_friction", "dropped_samples")
+    assert found.fit.problem.free_forms == ("coulomb_friction.presliding",)
+    assert found.fit.problem.instants == 1
+    assert within_noise(found.fit)
+    assert found.fit.value("dropped_samples.lost_time") == pytest.approx(0.002, rel=0.1)
