@@ -46,10 +46,12 @@ def restricted(whole: Fit, names: Collection[str]) -> Fit:
 def sought_again(known: Fit) -> Fit:
     """A fit after a second search for instants and phases; each run keeps those with the smaller residual.
 
-    They were first found before the other effects, or their forms, were known.
+    They were first found before the other effects, or their forms, were known. An effect with a free form of its
+    own keeps its phases: the search is for the textbook form.
     """
+    free = {name.split(".")[0] for name in known.problem.free_forms}
     for kind in known.problem.effects:
-        if issubclass(kind, OwnNumbers):
+        if issubclass(kind, OwnNumbers) and kind.name not in free:
             with suppress(FitError, np.linalg.LinAlgError):
                 known = _sought_again(known, kind)
     return known
