@@ -40,6 +40,10 @@ from tunnel_sim.vocabulary.record import Array
 SKEWED_FROM: Final = 0.1
 """Least deviation of an interval's ends from a normal distribution's ends for the interval to be stated, in
 standard deviations. Judgement."""
+HELD_WITHIN: Final = 0.02
+"""Least departure of the probability within a normal distribution's ends from the stated probability for the
+interval to be stated, a fraction. Judgement. Of two narrow answers far apart, a small shift of an end loses
+much."""
 SMALL_CAUSES_FROM: Final = 0.05
 """Minimum probability of an answer for small causes to be considered beside it. Judgement."""
 
@@ -84,6 +88,11 @@ class NormalMixture:
         densities = [np.exp(-0.5 * end**2) / math.sqrt(2.0 * math.pi) for end in ends]
         moments = self.means * inside - self.weights * stds * (densities[1] - densities[0])
         return float(moments.sum() / inside.sum()) if inside.sum() > 0.0 else self.mean
+
+    def held(self, low: float, high: float) -> float:
+        """The probability between two values."""
+        stds = np.maximum(np.sqrt(self.variances), 1e-300)
+        return float(self.weights @ (ndtr((high - self.means) / stds) - ndtr((low - self.means) / stds)))
 
     def quantile(self, share: float) -> float:
         """The value below which the mixture has a given probability.
@@ -367,7 +376,9 @@ class Central:
         reach = 0.5 * (high - low)
         std = reach / float(ndtri(1.0 - tail))
         skew = max(abs(low - middle + reach), abs(high - middle - reach))
-        return cls(middle, std, (low, high) if skew > SKEWED_FROM * std else None)
+        held = whole.held(middle - reach, middle + reach)
+        differs = skew > SKEWED_FROM * std or abs(held - chosen.coefficient_interval) > HELD_WITHIN
+        return cls(middle, std, (low, high) if differs else None)
 
 
 def before_the_causes(nominal: Fit, after: Mapping[str, Quantity]) -> dict[str, Quantity]:
