@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from tunnel_sim.physics.run_settings import SettingsTable
-from tunnel_sim.vocabulary.plan import aerodynamic_damping, aerodynamic_stiffness
 from tunnel_sim.vocabulary.quantities import Angles, DurationPerRun
 from tunnel_sim.vocabulary.rig import Rig
 
@@ -29,23 +28,9 @@ def lagged_at_start(runs: SettingsTable, rig: Rig, since_release: DurationPerRun
     moving = (runs["aero_lag"] != 0.0) & (runs.wind_speed > 0.0) & (since_release > 0.0)
     if not moving.any():
         return found
-    area, length = rig.body.frontal_area, rig.body.length
-    air = aerodynamic_stiffness(
-        runs["cn_beta"],
-        air_density=runs.air_density,
-        wind_speed=runs.wind_speed,
-        frontal_area=area,
-        reference_length=length,
-    )
-    air_damping = aerodynamic_damping(
-        runs["cn_r"],
-        air_density=runs.air_density,
-        wind_speed=runs.wind_speed,
-        frontal_area=area,
-        reference_length=length,
-    )
+    air, air_damping = runs.air(rig)
     decay = 0.5 * (runs["mechanical_damping"] - air_damping) / inertia
-    lag = runs["aero_lag"] * length / np.where(moving, runs.wind_speed, 1.0)
+    lag = runs["aero_lag"] * rig.body.length / np.where(moving, runs.wind_speed, 1.0)
     time = np.where(moving, np.abs(lag), 1.0)
     # a fit may try a law that does not oscillate, or diverges
     with np.errstate(all="ignore"):

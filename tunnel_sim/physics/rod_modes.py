@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from tunnel_sim.physics.input_moment import InputMoment
 from tunnel_sim.physics.run_settings import RodTwist, SettingsTable
-from tunnel_sim.vocabulary.plan import aerodynamic_damping, aerodynamic_stiffness
 from tunnel_sim.vocabulary.quantities import Angles, Rates, Seconds, Times
 from tunnel_sim.vocabulary.record import Array, read_only
 from tunnel_sim.vocabulary.rig import Rig
@@ -130,15 +129,7 @@ class _TwoMasses:
     @classmethod
     def of(cls, runs: SettingsTable, rods: Sequence[RodTwist], rig: Rig) -> _TwoMasses:
         """The linear part of the runs' laws."""
-        inertia, area, length = runs["yaw_inertia"], rig.body.frontal_area, rig.body.length
-        density, speed = runs.air_density, runs.wind_speed
-        share = np.array([rod.inertia_share for rod in rods])
-        air = aerodynamic_stiffness(
-            runs["cn_beta"], air_density=density, wind_speed=speed, frontal_area=area, reference_length=length
-        )
-        air_damping = aerodynamic_damping(
-            runs["cn_r"], air_density=density, wind_speed=speed, frontal_area=area, reference_length=length
-        )
+        inertia, share = runs["yaw_inertia"], np.array([rod.inertia_share for rod in rods])
         return cls(
             share * inertia,
             (1.0 - share) * inertia,
@@ -146,8 +137,7 @@ class _TwoMasses:
             runs["mechanical_damping"],
             np.array([1.0 / rod.compliance for rod in rods]),
             np.array([rod.damping(own) for rod, own in zip(rods, inertia.tolist(), strict=True)]),
-            air,
-            air_damping,
+            *runs.air(rig),
         )
 
     def lead(self, root: _Complex) -> _Complex:

@@ -19,7 +19,7 @@ from tunnel_sim.physics.input_moment import InputMoment
 from tunnel_sim.physics.moment_law import operation_names, parameter_names
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
-from tunnel_sim.vocabulary.plan import AeroDerivatives
+from tunnel_sim.vocabulary.plan import AeroDerivatives, aerodynamic_damping, aerodynamic_stiffness
 from tunnel_sim.vocabulary.quantities import (
     Angles,
     Laws,
@@ -182,6 +182,18 @@ class SettingsTable:
     def law(self) -> Laws:
         """The parameters of the moment law; a view."""
         return self.numbers[:, : len(parameter_names())]
+
+    def air(self, rig: Rig, speed: SpeedPerRun | None = None) -> tuple[PerRun, PerRun]:
+        """Ka (N m/rad) and Ca (N m s/rad) of the air, by run; at the runs' own wind speeds if none are given."""
+        at = self.wind_speed if speed is None else speed
+        area, length, density = rig.body.frontal_area, rig.body.length, self.air_density
+        stiffness = aerodynamic_stiffness(
+            self["cn_beta"], air_density=density, wind_speed=at, frontal_area=area, reference_length=length
+        )
+        damping = aerodynamic_damping(
+            self["cn_r"], air_density=density, wind_speed=at, frontal_area=area, reference_length=length
+        )
+        return stiffness, damping
 
     def copy(self, rows: slice = slice(None)) -> SettingsTable:
         """An independent copy of the table, or of some of its runs."""

@@ -220,17 +220,7 @@ def _body_rates(rig: Rig, runs: SettingsTable) -> Array:
     fastest = np.array(
         [max(one.values) if one else v for one, v in zip(given, runs.wind_speed.tolist(), strict=True)]
     )
-    density, area, length = runs.air_density, rig.body.frontal_area, rig.body.length
-    air = aerodynamic_stiffness(
-        runs["cn_beta"],
-        air_density=density,
-        wind_speed=fastest,
-        frontal_area=area,
-        reference_length=length,
-    )
-    air_damping = aerodynamic_damping(
-        runs["cn_r"], air_density=density, wind_speed=fastest, frontal_area=area, reference_length=length
-    )
+    air, air_damping = runs.air(rig, fastest)
     steeper = air * _slope(runs, "moment_cubic", 3.0, angle, 0.2)
     thicker = runs["damping_quadratic"] * _power(angle, 2.0, runs["damping_quadratic_exponent"], 0.2)
     loss = damping - air_damping * (1.0 + thicker)
