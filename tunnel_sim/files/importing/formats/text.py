@@ -234,10 +234,13 @@ def _holds_texts(rows: Sequence[Sequence[str]], column: int, decimal: str) -> bo
 
 
 def find_dialect(body: Sequence[str], choices: ImportChoices) -> Dialect | None:
-    """The dialect in which most cells of some lines are numbers; of several, the dialect with most columns."""
+    """The dialect in which most cells of some lines are numbers; of several, the dialect with most columns.
+
+    Three decimals may also be thousands: of two signs, the one without separators of thousands is decimal.
+    """
     delimiters = _NAMES.values() if choices.delimiter is None else (_NAMES[choices.delimiter],)
     decimals = (".", ",") if choices.decimal is None else (choices.decimal,)
-    best, score = None, (0.2, 0)
+    best, score = None, (0.2, 0, 0.0)
     for delimiter in delimiters:
         for decimal in decimals:
             if delimiter == "," == decimal and not any('"' in line for line in body):
@@ -245,9 +248,12 @@ def find_dialect(body: Sequence[str], choices: ImportChoices) -> Dialect | None:
             rows = [Dialect(delimiter, decimal, 0).split(line) for line in body]
             width = Counter(len(row) for row in rows).most_common(1)[0][0] if rows else 0
             cells = [cell for row in rows for cell in row if not is_missing(cell)]
-            share = sum(like_number(cell, decimal) for cell in cells) / max(len(cells), 1)
-            if (round(share, 1), width) > score:
-                best, score = Dialect(delimiter, decimal, width), (round(share, 1), width)
+            share, plain = (
+                round(sum(reads(cell, decimal) for cell in cells) / max(len(cells), 1), 1)
+                for reads in (like_number, is_number)
+            )
+            if (share, width, plain) > score:
+                best, score = Dialect(delimiter, decimal, width), (share, width, plain)
     return best
 
 

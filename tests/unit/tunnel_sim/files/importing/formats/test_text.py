@@ -190,6 +190,16 @@ def test_half_a_column_of_unknown_numbers_is_refused(form: str, tmp_path: Path) 
         read_records([written(tmp_path, "log.csv", text)])
 
 
+def test_three_decimals_are_no_thousands(tmp_path: Path) -> None:
+    """Beside a clock, the only sign of a comma's meaning is the column itself."""
+    time, angle = decay()
+    degrees = (20.0 + np.degrees(angle)).round(3)
+    rows = [f"09:30:{t:06.3f};{a:.3f}".replace(".", ",") for t, a in zip(time, degrees, strict=True)]
+    path = written(tmp_path, "clock.csv", "\n".join(["Clock;Angle (deg)", *rows]))
+    (run,) = read_records([path]).campaign.runs
+    np.testing.assert_allclose(run.record.yaw_rad, np.radians(degrees), atol=1e-9)
+
+
 def test_a_point_between_thousands_is_no_decimal_point(tmp_path: Path) -> None:
     """Such a clock, in whole milliseconds, would start anew at each thousand, or lose its first rows."""
     time, angle = decay(duration=2.5)
