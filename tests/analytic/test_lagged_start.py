@@ -1,56 +1,64 @@
-"""The lag's state at the start of a run in motion, against the run from its release."""
+"""The lag's state at the start of a run in motion, against SciPy's integration from the release."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from tests.analytic.law_cases import RIG
-from tunnel_sim.physics.forward import forward_run, integrate
 from tunnel_sim.physics.lagged_start import lagged_at_start
-from tunnel_sim.physics.moment_law import parameter_vector
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.plan import AeroDerivatives
 from tunnel_sim.vocabulary.record import Array
 
-INTERVAL, SWING = 4e-3, 0.35
+SPRING, INERTIA, DAMPING, SPEED, DENSITY, SWING = 30.5, 0.1014, 0.012, 18.0, 1.2, 0.35
+CN_BETA, CN_R = 0.49, -0.11
 WITHIN, ASTRAY = 2e-3, 2e-2  # of the swing
 
 
 def run(lag: float, angle: float = SWING, rate: float = 0.0) -> RunSettings:
-    air = AeroDerivatives(0.49, -0.11)
+    air = AeroDerivatives(CN_BETA, CN_R)
     return RunSettings(
-        30.5, air, 0.1014, 0.012, 18.0, 1.2, angle, release_rate=rate, parameters={"aero_lag": lag}
+        SPRING, air, INERTIA, DAMPING, SPEED, DENSITY, angle, release_rate=rate, parameters={"aero_lag": lag}
     )
 
 
-def integrated(settings: RunSettings, samples: int, lagged: float | None = None) -> tuple[Array, Array]:
-    row, keep_alive = forward_run(settings)
-    row["steps"], row["step"] = 4, INTERVAL / 4
-    row["rate"] = settings.release_rate
-    if lagged is not None:
-        row["lagged"] = lagged
-    angle, rate, status = integrate(parameter_vector(settings.law(RIG))[None], row, samples)
-    del keep_alive
-    assert status == 0
-    return angle[0], rate[0]
+def moved(lag: float, begin: Array, times: Array) -> Array:
+    """Angle, rate and the lag's state at some times, from those at the first, by the equation of the effect."""
+    area, length = RIG.body.frontal_area, RIG.body.length
+    air = 0.5 * DENSITY * SPEED**2 * area * length * CN_BETA
+    air_damping = 0.5 * DENSITY * SPEED * area * length**2 * CN_R
+    constant = abs(lag) * length / SPEED
+
+    def rates(_: float, y: Array) -> list[float]:
+        angle, rate, state = y
+        seen = state if lag > 0.0 else 2.0 * angle - state
+        moment = air * seen - SPRING * angle + (air_damping - DAMPING) * rate
+        return [rate, moment / INERTIA, (angle - state) / constant]
+
+    solved = solve_ivp(rates, (times[0], times[-1]), begin, "DOP853", times, rtol=1e-10, atol=1e-12)
+    return np.asarray(solved.y, np.float64)
+
+
+TIMES = np.arange(0.0, 6.0, 0.004)
 
 
 @pytest.mark.parametrize("start", [10, 40, 150, 700])
 @pytest.mark.parametrize("lag", [0.5, 2.0, -1.5])
 def test_a_part_of_a_run_moves_like_the_run(lag: float, start: int) -> None:
-    angle, rate = integrated(run(lag), 1500)
-    part = run(lag, float(angle[start]), float(rate[start]))
-    (state,) = lagged_at_start(part.table, RIG, np.array([start * INTERVAL]))
-    followed, _ = integrated(part, 1500 - start, float(state))
-    assert np.abs(followed - angle[start:]).max() < WITHIN * SWING
+    whole = moved(lag, np.array([SWING, 0.0, SWING]), TIMES)
+    angle, rate, _ = whole[:, start].tolist()
+    (state,) = lagged_at_start(run(lag, angle, rate).table, RIG, TIMES[[start]])
+    part = moved(lag, np.array([angle, rate, state]), TIMES[start:])
+    assert np.abs(part[0] - whole[0, start:]).max() < WITHIN * SWING
 
 
 def test_the_angle_itself_is_another_state() -> None:
-    angle, rate = integrated(run(2.0), 1500)
-    part = run(2.0, float(angle[40]), float(rate[40]))
-    followed, _ = integrated(part, 1460)
-    assert np.abs(followed - angle[40:]).max() > ASTRAY * SWING
+    whole = moved(2.0, np.array([SWING, 0.0, SWING]), TIMES)
+    angle, rate, _ = whole[:, 40]
+    part = moved(2.0, np.array([angle, rate, angle]), TIMES[40:])
+    assert np.abs(part[0] - whole[0, 40:]).max() > ASTRAY * SWING
 
 
 def test_at_the_release_it_is_the_angle() -> None:
