@@ -116,6 +116,18 @@ def test_wide_differences_do_not_hide_a_lag_beside_a_form_that_is_not_exact() ->
     assert diagnose(as_campaign(made, "lead"), kinds=kinds).causes == ("cubic_stiffness", "unsteady_aero_lag")
 
 
+@pytest.mark.slow
+def test_a_form_is_tried_though_its_error_looks_like_wide_scatter() -> None:
+    """A spring of two stiffnesses, of the reference simulator, beside a wrong spring and stated scatter."""
+    shares = {"single": 0.4, "pair": 0.4, "none": 0.2}
+    (made,) = simulate_set([draw_set(24, 8801, shares, Mixture(scatter=1.0))[14]])
+    others = ["flow_misalignment", "sensor_clipping", "sensor_drift", "spring_miscalibration"]
+    found = diagnose(
+        as_campaign(made, "bilinear"), kinds=vocabulary(["asymmetric_stiffness", *others, *SCATTERED])
+    )
+    assert found.causes == ("asymmetric_stiffness", "sensor_clipping", "spring_miscalibration")
+
+
 def test_an_effect_that_does_what_the_scatter_does_is_left_out() -> None:
     """In runs that repeat a wrong spring explains some of the differences; beside them it explains nothing."""
     cubic, spring = effect_class("cubic_stiffness"), effect_class("spring_miscalibration")
