@@ -140,7 +140,7 @@ class ParameterSet:
 
     def pull(self, point: Point) -> Array:
         """Half the fall of `surprise` with each own parameter, shape (runs, own)."""
-        return np.asarray(self.precision * (0.0 - point.per_run), np.float64)
+        return np.asarray(-self.precision * point.per_run, np.float64)
 
     def surprise(self, point: Point) -> float:
         """Distance of the own parameters from their priors, in variances, summed; a part of χ²."""

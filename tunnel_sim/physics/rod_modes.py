@@ -51,6 +51,16 @@ class Response:
         residue = linear.residue(root, lead, on_body=drive.on_body)
         return cls(drive, complex(root[0]), complex(residue[0]))
 
+    def without_rigid(self, body: float, inertia: float) -> Response:
+        """The response without that of the rig with a rigid rod, which is integrated.
+
+        Args:
+            body: the body's angle per angle of the upper end.
+            inertia: inertia of the rig with the rigid rod, kg m².
+        """
+        moved = body if self.drive.on_body else 1.0
+        return replace(self, residue=self.residue - moved / (2j * self.root.imag * inertia))
+
 
 @dataclass(frozen=True, eq=False)
 class Ringing:
@@ -216,12 +226,8 @@ def separate_ringing(runs: SettingsTable, rig: Rig) -> dict[int, SlowMotion]:
     rows = np.flatnonzero(able)
     root, fast, lead, fast_lead = (one[rows] for one in (root, fast, lead, fast_lead))
     inertia, body, end = inertia[rows], body[rows], end[rows]
-    # Amplitudes of two oscillations that add up to the release's angle, its rate, the twist and its rate.
-    pairs = [(np.ones_like(root),) * 2, (root, fast), (lead, fast_lead), (root * lead, fast * fast_lead)]
-    matrix = np.stack([np.stack([a.real, -a.imag, b.real, -b.imag], axis=1) for a, b in pairs], axis=1)
     state = np.stack([end, some["release_rate"][rows], released[rows] - end, np.zeros_like(end)], axis=1)
-    parts = np.linalg.solve(matrix, state[:, :, None])[:, :, 0]
-    slow, ringing = parts[:, 0] + 1j * parts[:, 1], parts[:, 2] + 1j * parts[:, 3]
+    slow, ringing = _amplitudes(state, (root, fast), (lead, fast_lead))
     at = np.array(places)[rows]
     runs["yaw_inertia"][at] = inertia
     damping = -2.0 * root.real * inertia + linear.air_damping[rows] * body**2
@@ -233,12 +239,9 @@ def separate_ringing(runs: SettingsTable, rig: Rig) -> dict[int, SlowMotion]:
         responses: tuple[Response, ...] = ()
         if (drive := runs.drive[place]) is not None:
             own, one = linear.row(row), slice(number, number + 1)
-            slow_part = Response.of(own, drive, root[one], lead[one])
-            # integrated already
-            moved = body[number] if drive.on_body else 1.0
-            integrated = moved / (2j * slow_part.root.imag * inertia[number])
-            slow_part = replace(slow_part, residue=slow_part.residue - integrated)
-            responses = slow_part, Response.of(own, drive, fast[one], fast_lead[one])
+            of_slow = Response.of(own, drive, root[one], lead[one])
+            of_slow = of_slow.without_rigid(float(body[number]), float(inertia[number]))
+            responses = of_slow, Response.of(own, drive, fast[one], fast_lead[one])
         found[place] = SlowMotion(
             float(lead[number].real),
             float(strained[row]),
@@ -246,6 +249,21 @@ def separate_ringing(runs: SettingsTable, rig: Rig) -> dict[int, SlowMotion]:
             Ringing(complex(ringing[number]), complex(fast[number]), responses),
         )
     return found
+
+
+def _amplitudes(
+    state: Array, roots: tuple[_Complex, _Complex], leads: tuple[_Complex, _Complex]
+) -> tuple[_Complex, _Complex]:
+    """Amplitudes of two oscillations that add up to the release, rad, shape (runs,) each.
+
+    Args:
+        state: angle of the upper end, its rate, the twist and its rate, shape (runs, 4).
+    """
+    (root, fast), (lead, fast_lead) = roots, leads
+    pairs = [(np.ones_like(root),) * 2, roots, leads, (root * lead, fast * fast_lead)]
+    matrix = np.stack([np.stack([a.real, -a.imag, b.real, -b.imag], axis=1) for a, b in pairs], axis=1)
+    parts = np.linalg.solve(matrix, state[:, :, None])[:, :, 0]
+    return parts[:, 0] + 1j * parts[:, 1], parts[:, 2] + 1j * parts[:, 3]
 
 
 def _upper_root(
