@@ -11,7 +11,7 @@ from math import floor, log10
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_sim.files.importing.tables import LEAST_ROWS
+from tunnel_sim.files.importing.tables import LEAST_ROWS, SERIES_APART
 from tunnel_sim.vocabulary.errors import TunnelError, counted
 from tunnel_sim.vocabulary.quantities import PerSample, Readings, Seconds, Times
 from tunnel_sim.vocabulary.record import Array
@@ -23,7 +23,6 @@ _RESTARTS = 0.01  # share of backward steps up to which the clock restarts and t
 _FEW_RESTARTS = 3  # in a short record
 _FEW = 0.1  # share of rows out of order that a logger may mix up; more of them are several runs
 _SMOOTH = 0.1  # white noise in a smooth reading, relative to its swing
-_APART = 3.0  # ratio of the roughness of alternating series in one column to their own
 _ROUNDED = 1e-9  # share of the range: readings that differ by less are equal
 _FLAT = 3  # samples: a shorter peak may be flat by chance
 _FLATTER = 5  # ratio of samples at the last level to the level below: a parabola reaches at most 2.4
@@ -190,7 +189,7 @@ def _series(time: Times, reading: Readings) -> int:
         return 1
     rows = reading[whole[:, np.newaxis] + np.arange(usual)]
     one, several = (float(np.mean(np.diff(part, 4, axis=0) ** 2)) for part in (rows.ravel(), rows))
-    return usual if one > _APART**2 * several else 1
+    return usual if one > SERIES_APART**2 * several else 1
 
 
 def _spread(time: Times, rows: NDArray[np.intp]) -> Times:

@@ -14,7 +14,7 @@ from tunnel_sim.files.importing.column_names import ANGLE, listed, named_kind, n
 from tunnel_sim.files.importing.remarks import doubt
 from tunnel_sim.files.importing.source import read_source
 from tunnel_sim.files.importing.tables import NO_CHANNEL, Channel, RunColumn
-from tunnel_sim.files.importing.units import UNITS, kind_of, known_unit, written_unit
+from tunnel_sim.files.importing.units import HERTZ, UNITS, kind_of, known_unit, written_unit
 from tunnel_sim.files.plausible import standing_for_missing
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import Quantity
@@ -51,7 +51,6 @@ _RATE_FACTS = re.compile(
 _STEP_FACTS = re.compile(
     r"(?i)(^|[^a-z])(ts|dt|delta[ _]?t|sample[ _]?(time|interval)|sampling[ _]?(time|interval))($|[^a-z])"
 )
-_HERTZ = {"khz": 1e3, "mhz": 1e6}
 _OWN_STEP = re.compile(r"(?i)^(wf_increment|delta_x|(x[ _]?)?increment)( \(s\))?$")
 
 _STEPS = (1.0 / limits.FASTEST_RATE, 1.0 / limits.SLOWEST_RATE)  # s
@@ -131,7 +130,7 @@ def sample_interval(facts: Mapping[str, float], choices: ImportChoices) -> tuple
         for name, value in facts.items():
             word = re.split(r"[\s_(\[]+", name.rstrip(")] "))[-1]
             factor = (
-                _HERTZ.get(word.lower(), 1.0) if is_rate else UNITS["time"].get(known_unit(word) or "", 1.0)
+                HERTZ.get(word.lower(), 1.0) if is_rate else UNITS["time"].get(known_unit(word) or "", 1.0)
             )
             if pattern.search(name) and least <= value * factor <= most:
                 interval = 1.0 / (value * factor) if is_rate else float(value * factor)

@@ -29,6 +29,8 @@ _RUN_NAMES = re.compile(
 )
 LEAST_ROWS = 16
 """Minimum number of rows of a record: a shorter table beside longer ones holds conditions or sizes."""
+SERIES_APART = 3.0
+"""Ratio of the roughness of several series in one column to their own, above which they are several."""
 _LEAST_EACH = 8  # rows of a run, on average: a column that changes more often does not number runs
 
 

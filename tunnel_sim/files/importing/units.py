@@ -81,6 +81,10 @@ _UNIT_WORD = re.compile(r"(?i)(?:unit|einheit)(?:s|en)?\W+([^\s,;:=]+)\W*$")
 _LONGEST = 10  # characters: a longer word is not a unit
 
 
+HERTZ: Mapping[str, float] = {"hz": 1.0, "khz": 1e3, "mhz": 1e6}
+"""Units of sample rates in small letters, in Hz."""
+
+
 def known_unit(text: str) -> str | None:
     """The unit named by a text; None if it does not name a known unit."""
     word = text.strip().strip("()[]{}<>").strip()

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 import polars as pl
 
-from tunnel_sim.files.importing.tables import LEAST_ROWS
+from tunnel_sim.files.importing.tables import LEAST_ROWS, SERIES_APART
 from tunnel_sim.vocabulary.errors import counted, one_line
 from tunnel_sim.vocabulary.quantities import Rows
 
@@ -33,7 +33,6 @@ _LIKE_A_NUMBER = r"^\W{0,3}\d"
 _PART = 2**20  # number of texts converted at once
 _WORD = r"^\W*[^\W\d_]{2}"
 _MOST_SERIES = 16  # number of series that a column of texts may distinguish
-_APART = 3.0  # ratio of the roughness of several series in one column to their own
 _MOST_SHORT = 0.1  # share of rows: more of them are not the tables beside a record
 _FEW_UNREAD = 0.05  # share of a column: damaged lines of a serial log are fewer
 
@@ -116,7 +115,7 @@ def series_by(labels: pl.Series, values: Rows) -> int:
     bends = [np.diff(values[rows], 4) ** 2 for rows in groups]
     together = np.diff(values[np.any(groups, axis=0)], 4) ** 2
     apart = float(np.mean(np.concatenate(bends)))
-    return len(groups) if float(np.mean(together)) > _APART**2 * apart else 1
+    return len(groups) if float(np.mean(together)) > SERIES_APART**2 * apart else 1
 
 
 def unread_in(column: pl.Series, number: pl.Series) -> tuple[str, ...]:

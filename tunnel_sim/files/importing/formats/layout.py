@@ -10,7 +10,7 @@ from itertools import pairwise
 
 from tunnel_sim.files.importing.formats.cells import is_missing, is_number, like_number
 from tunnel_sim.files.importing.tables import LEAST_ROWS, names_runs
-from tunnel_sim.files.importing.units import UNITS, kind_of, known_unit, split_unit, unit_beside
+from tunnel_sim.files.importing.units import HERTZ, UNITS, kind_of, known_unit, split_unit, unit_beside
 
 _FACT = re.compile(
     r"(?:^|[,;|\t])\W*([^\W\d_](?:[^\d:=,;\t]|(?<=[^\W_])\d|(?<=\^)-?\d)*?)\s*[:=,;\t]\s*"
@@ -18,7 +18,6 @@ _FACT = re.compile(
     r"(?!\d|[.:/-]\d) *([;,\t]? *[^\s\d;,\t|=:][^;,\t|=:]*(?![^;,\t|]))?"
 )
 """A name, perhaps a cell with its unit, a number, and its unit, perhaps in the next cell; not a date or time."""
-_HERTZ = {"hz": 1.0, "khz": 1e3, "mhz": 1e6}
 _SI = {kind: next(unit for unit, factor in units.items() if factor == 1.0) for kind, units in UNITS.items()}
 _AXIS = re.compile(r"(?i)\W*(horizontal|vertical) units?\s*[,:;=\t]\s*(.+)$")
 _COUNTS = ("sequence", "points")  # beside units: the column counts samples
@@ -77,8 +76,8 @@ def facts_in(lines: Sequence[str]) -> dict[str, float]:
             unit, value = known_unit(text), float(number.replace(",", "."))
             if unit is not None:
                 text, value = _SI[kind_of(unit)], value * UNITS[kind_of(unit)][unit]
-            elif text.lower() in _HERTZ:
-                text, value = "", value * _HERTZ[text.lower()]
+            elif text.lower() in HERTZ:
+                text, value = "", value * HERTZ[text.lower()]
             heading = f"{name} ({text})" if text else name
             facts[heading] = value if facts.get(heading, value) == value else float("nan")
     return facts
