@@ -10,11 +10,11 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from identification.examination.self_excited import in_limit_cycle
-from identification.show.numbers import reading_shown
+from identification.show.numbers import joined_mark, listed, significant, unit_shown
 from identification.signal.frequency import starting_frequency, thinned_reading
 from identification.status import Remark
 from tunnel_sim.vocabulary.campaign import Campaign
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError, counted
 from tunnel_sim.vocabulary.record import Array, evenly_spaced
 
 SECOND_MODE_LEFT: Final = 0.5
@@ -142,15 +142,34 @@ def recognised_limit_cycles(remarks: Sequence[Remark]) -> tuple[Remark, ...]:
     return tuple(remark for remark in remarks if in_limit_cycle(remark.figures))
 
 
-def second_mode_words(found: TwoModes, unit: str) -> str:
-    """A second mode in a run, its amplitudes in a unit of readings."""
+def second_mode_words(found: Sequence[TwoModes], unit: str) -> str:
+    """The second modes of some runs, with amplitudes in a unit of readings; empty without any."""
+    if not found:
+        return ""
+    runs = [mode.run for mode in found]
+    contain = (
+        f"{runs[0]} contains" if len(runs) == 1 else f"{counted(len(runs), 'run')} ({listed(runs)}) contain"
+    )
     main, second = (
-        f"{reading_shown(mode.amplitude_rad, 2, unit)} at {mode.frequency_hz:.3g} Hz, decaying at "
-        f"{mode.decay_per_s:.2g} 1/s"
-        for mode in (found.main, found.second)
+        _modes_words(modes, unit) for modes in zip(*((one.main, one.second) for one in found), strict=True)
     )
+    closes = _range([100.0 * mode.closes for mode in found], 2)
     return (
-        f"{found.run} contains a second mode: {second}. The main mode is {main}. The second mode explains "
-        f"{100.0 * found.closes:.0f} % of the residual of one free decay. A rig with one degree of freedom has "
-        "one mode: look for another motion, such as heave or a motion of the mount."
+        f"{contain} a second mode: {second}. The main mode is {main}. The second mode explains {closes} % of the "
+        "residual of one free decay. A rig with one degree of freedom has one mode: look for another motion, such "
+        "as heave or a motion of the mount."
     )
+
+
+def _modes_words(modes: Sequence[Mode], unit: str) -> str:
+    """Amplitudes, frequencies and decay rates of modes, each from the least to the greatest."""
+    mark, factor = unit_shown(unit)
+    amplitude = _range([factor * mode.amplitude_rad for mode in modes], 2) + joined_mark(mark)
+    frequency, rate = [mode.frequency_hz for mode in modes], [mode.decay_per_s for mode in modes]
+    return f"{amplitude} at {_range(frequency, 3)} Hz, decaying at {_range(rate, 2)} 1/s"
+
+
+def _range(values: Sequence[float], digits: int) -> str:
+    """Such as ``0.04 to 0.11``; one number where both ends round to the same."""
+    least, most = significant(min(values), digits), significant(max(values), digits)
+    return least if least == most else f"{least} to {most}"

@@ -162,6 +162,6 @@ _NO_CHANGE = 0.01  # %: smaller changes are shown as this
 def _with_second_modes(said_first: str, answer: Findings) -> list[str]:
     """The answer and the second modes of single runs; the modes come first where every run has one."""
     modes = answer.found.second_modes
-    said = [second_mode_words(one, answer.misfit.unit) for one in modes]
+    said = second_mode_words(modes, answer.misfit.unit)
     of_all = {one.run for one in modes} >= {run.id for run in answer.gap.runs}
-    return [*said, said_first] if of_all else [said_first, *said]
+    return [said, said_first] if of_all else [said_first, said]

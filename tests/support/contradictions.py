@@ -41,7 +41,7 @@ def _wind(document: Document, text: str) -> bool:
 def _tried(document: Document, text: str) -> bool:
     """A second mode explains a share, and no set with one was weighed."""
     answers = " + ".join(one["effect"] for one in document["candidates"])
-    return "contains a second mode" in text and "second_mode" not in answers
+    return bool(re.search("contains? a second mode", text)) and "second_mode" not in answers
 
 
 PAIRS: Mapping[str, Callable[[Document, str], bool]] = {

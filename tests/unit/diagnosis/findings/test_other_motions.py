@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagnosis import diagnose
-from diagnosis.findings.other_motions import second_modes
+from diagnosis.findings.other_motions import Mode, TwoModes, second_mode_words, second_modes
 from diagnosis.likelihood.starting_points import misses_motion
 from diagnosis.search.investigate import investigate
 from tests.marks import slow
@@ -35,6 +35,22 @@ def test_a_second_mode_is_named_even_where_it_decays_in_a_quarter_of_the_run(rat
     assert found.second.frequency_hz == pytest.approx(2.9, rel=0.01)
     assert (found.main.amplitude_rad, found.main.frequency_hz) == pytest.approx((0.3, 2.2), rel=0.02)
     assert 0.5 < found.closes <= 1.0
+
+
+def test_one_sentence_says_the_second_modes_of_all_runs():
+    first = TwoModes("a", Mode(0.3, 2.2, 0.1), Mode(0.02, 2.9, 0.2), 0.98)
+    text = second_mode_words([first], "rad")
+    assert text.startswith(
+        "a contains a second mode: 1.1° at 2.90 Hz, decaying at 0.20 1/s. The main mode is 17° at"
+    )
+    assert "explains 98 % of the residual" in text
+    other = TwoModes("b", Mode(0.15, 3.3, 0.1), Mode(0.04, 2.9, 0.3), 0.6)
+    text = second_mode_words([first, other], "rad")
+    assert text.startswith(
+        "2 runs (a and b) contain a second mode: 1.1 to 2.3° at 2.90 Hz, decaying at 0.20 to 0.30 1/s. "
+        "The main mode is 8.6 to 17° at 2.20 to 3.30 Hz, decaying at 0.10 1/s. The second mode explains 60 to 98 %"
+    )
+    assert second_mode_words([], "rad") == ""
 
 
 @pytest.mark.parametrize("others", [(), ((0.02, 6.6, 0.3),), ((0.02, 2.21, 0.1),)])
