@@ -77,20 +77,20 @@ def steady_filters(
     identity = np.eye(transition.shape[1])
     with np.errstate(all="ignore"):  # a diverging trial is rejected by its spread
         for _ in range(_DOUBLINGS):
-            inverted = np.linalg.inv(identity + g @ covariance)
+            inverted, turned = np.linalg.inv(identity + g @ covariance), a.swapaxes(1, 2)
             left = a @ inverted
-            grown = covariance + np.swapaxes(a, 1, 2) @ covariance @ inverted @ a
-            g = g + left @ g @ np.swapaxes(a, 1, 2)
-            a = left @ a
-            done = np.max(np.abs(grown - covariance)) <= 1e-12 * np.max(np.abs(grown))
-            covariance = 0.5 * (grown + np.swapaxes(grown, 1, 2))
+            grown = covariance + turned @ covariance @ inverted @ a
+            done = np.abs(grown - covariance).max() <= 1e-12 * np.abs(grown).max()
+            covariance = 0.5 * (grown + grown.swapaxes(1, 2))
             if done:
                 break
+            g = g + left @ g @ turned
+            a = left @ a
     spread = covariance[:, 0, 0] + variance
     gain = np.einsum("rij,rj->ri", transition, covariance[:, :, 0]) / spread[:, None]
     closed = transition.copy()
     closed[:, :, 0] -= gain
-    numerators, denominators = _characteristic(transition), _characteristic(closed)
+    numerators, denominators = np.split(_characteristic(np.concatenate((transition, closed))), 2)
     return [
         (numerators[i], denominators[i], float(spread[i]))
         if np.isfinite(spread[i])
@@ -102,11 +102,12 @@ def steady_filters(
 def _characteristic(matrices: Array) -> Array:
     """Coefficients of the characteristic polynomials, shape (systems, n + 1), by Faddeev and Le Verrier."""
     count, size, _ = matrices.shape
-    found, power = np.ones((count, size + 1)), np.broadcast_to(np.eye(size), matrices.shape)
+    found, identity = np.ones((count, size + 1)), np.eye(size)
+    product = matrices
     for k in range(1, size + 1):
-        product = matrices @ power
-        found[:, k] = -np.trace(product, axis1=1, axis2=2) / k
-        power = product + found[:, k, None, None] * np.eye(size)
+        if k > 1:
+            product = matrices @ (product + found[:, k - 1, None, None] * identity)
+        found[:, k] = -product.trace(axis1=1, axis2=2) / k
     return found
 
 
