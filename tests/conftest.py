@@ -33,14 +33,14 @@ settings.load_profile("patient")
 def pytest_collection() -> Iterator[None]:
     """Thousands of tests live until the end: the garbage collector would go over them again and again.
 
-    It comes after 20,000 new objects and not after 700: a figure has thousands.
+    It comes after 100,000 new objects and not after 700: a figure has thousands.
     """
     gc.disable()
     try:
         return (yield)
     finally:
         gc.freeze()
-        gc.set_threshold(20_000)
+        gc.set_threshold(100_000)
         gc.enable()
 
 
