@@ -127,11 +127,9 @@ class _Channel:
         kept = self.residual[_skip(self) :] / np.sqrt(self.variance)
         return float(kept.size * np.log(self.variance) + kept @ kept)
 
-    def acceleration(self, part: SpectrumPart) -> float:
-        """Acceleration per unit intensity of a part, rad/s²; 0 where it does not act."""
-        return (
-            self.per_moment * part.source.moment(self.run, self.data) if part.source.acts(self.run) else 0.0
-        )
+    def acceleration(self, source: MomentSource) -> float:
+        """Acceleration per unit intensity of a source's moment, rad/s²; 0 where it does not act."""
+        return self.per_moment * source.moment(self.run, self.data) if source.acts(self.run) else 0.0
 
 
 def random_moments(fit: Fit, source: MomentSource) -> list[ProcessNoise]:
@@ -215,14 +213,14 @@ def _fit(
         return tuple(form.part(*own.tolist()) for form, own in zip(forms, split, strict=True))
 
     def cost(x: Array) -> float:
-        return sum(c for c, _ in _filtered(channels, [spectrum(x)] * len(channels)))
+        return sum(c for c, _ in _filtered(channels, [spectrum(x)]))
 
     grid = np.log(forms[-1].grid)
     if known is not None:
         fixed = np.log([value for part in known.spectrum for value in part.parameters])
         grid = np.hstack([np.tile(fixed, (len(grid), 1)), grid])
-    every = [spectrum(x) for x in grid for _ in channels]
-    costs = np.array([c for c, _ in _filtered(list(channels) * len(grid), every)]).reshape(len(grid), -1)
+    tried = _filtered(channels, [spectrum(x) for x in grid])
+    costs = np.array([c for c, _ in tried]).reshape(len(grid), -1)
     totals = costs.sum(axis=1)
     if known is not None and not totals.min() < sum(c.white_cost for c in channels) - known.drop - price:
         return None
@@ -248,7 +246,7 @@ def _fit(
 
 
 def _fitted(channels: Sequence[_Channel], spectrum: Spectrum, cost: float) -> ProcessNoise:
-    costs, innovations = zip(*_filtered(channels, [spectrum] * len(channels)), strict=True)
+    costs, innovations = zip(*_filtered(channels, [spectrum]), strict=True)
     count = sum(i.size for i in innovations)
     drops = np.array([c.white_cost for c in channels]) - np.array(costs)
     broad = tuple(SpectrumPart(part.intensity, LONGEST_BANDWIDTH, source=part.source) for part in spectrum)
@@ -270,7 +268,7 @@ def _by_third(channels: Sequence[_Channel], spectrum: Spectrum) -> tuple[Array, 
     costs = np.zeros((_UNSTEADY.size, 3))
     for row, factor in zip(costs, np.exp(_UNSTEADY).tolist(), strict=True):
         other = tuple(replace(part, intensity=factor * part.intensity) for part in spectrum)
-        for cost, scaled in _filtered(channels, [other] * len(channels)):
+        for cost, scaled in _filtered(channels, [other]):
             if not np.isfinite(cost):
                 return np.ones(3), 0.0
             log_spread = (cost - scaled @ scaled) / scaled.size
@@ -287,7 +285,7 @@ def _by_third(channels: Sequence[_Channel], spectrum: Spectrum) -> tuple[Array, 
 def _powers(channels: Sequence[_Channel], spectrum: Spectrum) -> Array:
     """Power of the response at the end of each run, from rest, in noise variances."""
     power = []
-    for channel, a, q in zip(channels, *_discrete(channels, [spectrum] * len(channels)), strict=True):
+    for channel, a, q in zip(channels, *_discrete(channels, [spectrum]), strict=True):
         for _ in range(int(np.log2(channel.residual.size))):
             a, q = a @ a, q + a @ q @ a.T
         power.append(q[0, 0] / channel.variance)
@@ -397,7 +395,7 @@ def with_response(fit: Fit, spectrum: Spectrum) -> Data | None:
     runs = list(fit.problem.data.runs)
     acts = [i for i, run in enumerate(runs) if any(part.source.acts(run) for part in spectrum)]
     channels = {i: c for i in acts if (c := _channel(fit, i, 0.0)) is not None}
-    filters = _filters(list(channels.values()), [spectrum] * len(channels))
+    filters = _filters(list(channels.values()), [spectrum])
     for (i, channel), (numerator, denominator, spread) in zip(channels.items(), filters, strict=True):
         if not (np.isfinite(spread) and spread > 0.0):
             return None
@@ -439,11 +437,12 @@ def _skip(channel: _Channel) -> int:
 
 
 def _filtered(channels: Sequence[_Channel], spectra: Sequence[Spectrum]) -> list[tuple[float, Array]]:
-    """−2 ln L (without constants) and scaled innovations of the steady filter, by run."""
+    """−2 ln L (without constants) and scaled innovations of the steady filter, by spectrum and run."""
     from scipy.signal import lfilter  # only here: slow to load
 
     results = []
-    for channel, (numerator, denominator, spread) in zip(channels, _filters(channels, spectra), strict=True):
+    every = [channel for _ in spectra for channel in channels]
+    for channel, (numerator, denominator, spread) in zip(every, _filters(channels, spectra), strict=True):
         if not (np.isfinite(spread) and spread > 0.0):
             results.append((np.inf, np.zeros(0)))
             continue
@@ -458,31 +457,38 @@ def _cost(innovations: Array, spread: float) -> float:
 
 
 def _filters(channels: Sequence[_Channel], spectra: Sequence[Spectrum]) -> list[tuple[Array, Array, float]]:
-    """The filter from residuals to innovations, numerator and denominator, and their variance, rad², by run."""
+    """The filter from residuals to innovations, numerator and denominator, and their variance, rad².
+
+    By spectrum and run.
+    """
     transition, disturbance = _discrete(channels, spectra)
-    variance = np.array([c.variance for c in channels])
+    variance = np.array([c.variance for c in channels] * len(spectra))
     return steady_filters(transition, disturbance, variance)
 
 
 def _discrete(channels: Sequence[_Channel], spectra: Sequence[Spectrum]) -> tuple[Array, Array]:
-    """Transition and disturbance over one interval, shape (runs, n, n) each; all spectra are of the same form.
+    """Transition and disturbance over one interval, shape (spectra · runs, n, n); all spectra are of the same form.
 
     States: angle, rate, and the states of each part.
     """
     size = 2 + sum(part.states for part in spectra[0])
-    dynamics = np.zeros((len(channels), size, size))
+    dynamics = np.zeros((len(spectra), len(channels), size, size))
     drive = np.zeros_like(dynamics)
-    for own, noise, channel, spectrum in zip(dynamics, drive, channels, spectra, strict=True):
-        own[:2, :2] = channel.oscillator
+    dynamics[..., :2, :2] = np.array([channel.oscillator for channel in channels])
+    reduced = np.array([channel.reduced for channel in channels])
+    sources = {part.source for part in spectra[0]}
+    moved = {source: np.array([channel.acceleration(source) for channel in channels]) for source in sources}
+    for own, noise, spectrum in zip(dynamics, drive, spectra, strict=True):
         first = 2
         for part in spectrum:
-            places = slice(first, first + part.states)
-            driven = [1, *range(first, first + part.states)]
-            own[places, places], own[1, places], white = part.dynamics(
-                channel.acceleration(part), channel.reduced
+            last = first + part.states
+            driven = np.array([1, *range(first, last)])
+            own[:, first:last, first:last], own[:, 1, first:last], white = part.dynamics(
+                moved[part.source], reduced
             )
-            noise[np.ix_(driven, driven)] += white
-            first += part.states
-    interval = np.array([channel.interval for channel in channels])
-    transition, disturbance = discretised(dynamics, drive, interval)
+            noise[:, driven[:, None], driven] += white
+            first = last
+    interval = np.array([channel.interval for channel in channels] * len(spectra))
+    systems = (-1, size, size)
+    transition, disturbance = discretised(dynamics.reshape(systems), drive.reshape(systems), interval)
     return transition, disturbance + 1e-18 * np.eye(size)

@@ -125,23 +125,27 @@ class SpectrumPart:
         """Standard deviation of a white part beside the intensity, below `LONGEST_BANDWIDTH`, in its unit."""
         return 0.0
 
-    def dynamics(self, acceleration: float, reduced: float) -> tuple[Array, Array, Array]:
-        """The linear dynamics of the part's states, driven by white noise.
+    def dynamics(self, acceleration: Array, reduced: Array) -> tuple[Array, Array, Array]:
+        """The linear dynamics of the part's states in some runs, driven by white noise.
 
         Args:
-            acceleration: acceleration of the body per unit intensity, rad/s².
-            reduced: wind speed over the body's width, Hz.
+            acceleration: acceleration of the body per unit intensity, shape (runs,), rad/s².
+            reduced: wind speed over the body's width, shape (runs,), Hz.
 
         Returns:
-            The dynamics of the states, shape (states, states), 1/s; the acceleration of the body by each, shape
-            (states,); and the spectral intensity of the noise on the body's rate and on the states, shape
-            (1 + states, 1 + states), in SI units squared per s.
+            The dynamics of the states, shape (runs, states, states), 1/s; the acceleration of the body by each,
+            shape (runs, states); and the spectral intensity of the noise on the body's rate and on the states,
+            shape (1 + states, 1 + states), or one such matrix for each run, in SI units squared per s.
         """
+        count = self.states
         corner = 2.0 * np.pi * self.bandwidth
-        turn = 2.0 * np.pi * (self.centre + self.strouhal_number * reduced)
-        states = np.array([[-corner, -turn], [turn, -corner]])[: self.states, : self.states]
-        on_body = np.array([acceleration, 0.0])[: self.states]
-        return states, on_body, np.diag([0.0, *[2.0 * corner * self.intensity**2] * self.states])
+        states, on_body = np.zeros((reduced.size, count, count)), np.zeros((reduced.size, count))
+        states[:, range(count), range(count)] = -corner
+        if count == 2:
+            turn = 2.0 * np.pi * (self.centre + self.strouhal_number * reduced)
+            states[:, 0, 1], states[:, 1, 0] = -turn, turn
+        on_body[:, 0] = acceleration
+        return states, on_body, np.diag([0.0, *[2.0 * corner * self.intensity**2] * count])
 
     @property
     def band(self) -> Literal["broad_band", "narrow_band"]:
@@ -179,13 +183,14 @@ class FloorPart(SpectrumPart):
         """Spectral intensity of the white force, in the intensity's unit squared, s."""
         return 8.0 * np.pi * self.bandwidth * self.intensity**2 / (2.0 * np.pi * self.centre) ** 2
 
-    def dynamics(self, acceleration: float, reduced: float) -> tuple[Array, Array, Array]:
+    def dynamics(self, acceleration: Array, reduced: Array) -> tuple[Array, Array, Array]:
         """Place and speed of the floor; its acceleration moves the body, directly by the force too."""
         del reduced
         omega, damping = 2.0 * np.pi * self.centre, 4.0 * np.pi * self.bandwidth
         motion = np.array([-(omega**2), -damping])
-        shaken = np.array([acceleration, 0.0, 1.0])
-        return np.array([[0.0, 1.0], motion]), acceleration * motion, self._force * np.outer(shaken, shaken)
+        shaken = np.stack([acceleration, np.zeros_like(acceleration), np.ones_like(acceleration)], axis=1)
+        white = self._force * (shaken[:, :, None] * shaken[:, None, :])
+        return np.array([[0.0, 1.0], motion]), acceleration[:, None] * motion, white
 
 
 #: The parts of a random moment's spectrum, whose moments are independent of each other.

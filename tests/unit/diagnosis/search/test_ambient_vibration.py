@@ -135,7 +135,7 @@ def test_a_floor_that_resonates_is_ambient_vibration() -> None:
 def test_the_size_of_a_floors_moment_is_its_power_within_the_rigs_reach() -> None:
     """Truth: the spectrum of the acceleration of a resonance under a white force, summed by frequency."""
     part = FloorPart(0.05, 0.25, 5.0, source=SURROUNDINGS)
-    _, _, white = part.dynamics(1.0, 0.0)
+    _, _, (white,) = part.dynamics(np.ones(1), np.zeros(1))
     step = 1e-3
     frequency = np.arange(step, LONGEST_BANDWIDTH, step)
     place = frequency / part.centre
