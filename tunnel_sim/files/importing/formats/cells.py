@@ -16,6 +16,7 @@ from tunnel_sim.vocabulary.quantities import Rows
 
 MISSING = ("", "nan", "-nan", "#n/a", "n/a", "na", "null", "none", "-", "--", "inf", "-inf", "#num!")
 """Texts, in lower case, that stand for a missing number."""
+_MISSING = frozenset(MISSING)
 _NUMBER = {
     ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"),
     ",": re.compile(r"[+-]?(\d+(,\d+)?|,\d+)([eE][+-]?\d+)?"),
@@ -44,7 +45,7 @@ def is_number(text: str, decimal: str = ".") -> bool:
 
 def is_missing(text: str) -> bool:
     """Whether a text stands for a missing number."""
-    return text.lower() in MISSING
+    return text.lower() in _MISSING
 
 
 def like_number(text: str, decimal: str) -> bool:

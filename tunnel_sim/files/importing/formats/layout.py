@@ -108,10 +108,11 @@ def find_layout(
 
     def is_data(row: Sequence[str]) -> bool:
         cells = [(row[column] if column < len(row) else "", column) for column in numeric]
-        filled = sum(is_read(*cell) for cell in cells)
-        return filled > 0 and all(is_read(*cell) or is_missing(cell[0]) for cell in cells)
+        unread = [cell for cell, column in cells if not is_read(cell, column)]
+        return len(unread) < len(cells) and all(map(is_missing, unread))
 
-    starts = [i for i in range(len(rows)) if all(map(is_data, rows[i : i + 3]))]
+    data = [is_data(row) for row in rows]
+    starts = [i for i in range(len(rows)) if all(data[i : i + 3])]
     headings = [i for i, row in enumerate(rows) if len(row) > 1 and _is_heading(row, numeric, decimal)]
     first = next(iter(starts), None)
     if first is None:
@@ -119,7 +120,7 @@ def find_layout(
     # a short table above the record has another heading below it
     for heading in (i for i in headings if i > first):
         following = next((i for i in starts if i > heading), None)
-        if following is None or sum(map(is_data, rows[first:heading])) >= LEAST_ROWS:
+        if following is None or sum(data[first:heading]) >= LEAST_ROWS:
             break
         first = following
     above = []  # the rows that may name every column

@@ -67,7 +67,9 @@ class Dialect:
 
     def split(self, line: str) -> list[str]:
         """The cells of a line, without blanks and quotes around them."""
-        if self.delimiter == " ":
+        if '"' not in line:  # the rule below, many times faster
+            cells = line.split(None if self.delimiter == " " else self.delimiter)
+        elif self.delimiter == " ":
             cells = re.findall(r'"[^"]*"(?!\S)|\S+', line)
         else:
             sign = re.escape(self.delimiter)
@@ -242,16 +244,16 @@ def find_dialect(body: Sequence[str], choices: ImportChoices) -> Dialect | None:
     decimals = (".", ",") if choices.decimal is None else (choices.decimal,)
     best, score = None, (0.2, 0, 0.0)
     for delimiter in delimiters:
+        rows = [Dialect(delimiter, ".", 0).split(line) for line in body]
+        width = Counter(len(row) for row in rows).most_common(1)[0][0] if rows else 0
+        cells = [cell for row in rows for cell in row if not is_missing(cell)]
         for decimal in decimals:
             if delimiter == "," == decimal and not any('"' in line for line in body):
                 continue
-            rows = [Dialect(delimiter, decimal, 0).split(line) for line in body]
-            width = Counter(len(row) for row in rows).most_common(1)[0][0] if rows else 0
-            cells = [cell for row in rows for cell in row if not is_missing(cell)]
-            share, plain = (
-                round(sum(reads(cell, decimal) for cell in cells) / max(len(cells), 1), 1)
-                for reads in (like_number, is_number)
-            )
+            others = [cell for cell in cells if not is_number(cell, decimal)]
+            numbers = len(cells) - len(others)
+            alike = numbers + sum(like_number(cell, decimal) for cell in others)
+            share, plain = (round(count / max(len(cells), 1), 1) for count in (alike, numbers))
             if (share, width, plain) > score:
                 best, score = Dialect(delimiter, decimal, width), (share, width, plain)
     return best
