@@ -75,8 +75,9 @@ def _samples(motions: CompiledRuns, place: int, count: int) -> Array:
     arrays = 1 if of_wind else 2 if of_drive else 0  # for a drive, the values and their slopes
     size = sum(array.size for array in kept[0][:arrays])
     found = np.zeros((len(rows) - 1, max(size, 1)))
-    for change, row, there in zip(found, rows[1:], kept[1:], strict=True):
-        if any(row[name] != rows[name][0] for name in _OF_TIMES):
+    retimed = np.any([rows[name][1:] != rows[name][0] for name in _OF_TIMES], axis=0)
+    for change, there, apart in zip(found, kept[1:], retimed.tolist(), strict=True):
+        if apart:  # in another number of samples, too
             change[:] = np.nan
         elif any(one is not other for one, other in zip(kept[0][:arrays], there[:arrays], strict=True)):
             change[:] = np.concatenate(there[:arrays]) - np.concatenate(kept[0][:arrays])

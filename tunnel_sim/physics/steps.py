@@ -224,7 +224,9 @@ def _body_rates(rig: Rig, runs: SettingsTable) -> Array:
     steeper = air * _slope(runs, "moment_cubic", 3.0, angle, 0.2)
     thicker = runs["damping_quadratic"] * _power(angle, 2.0, runs["damping_quadratic_exponent"], 0.2)
     loss = damping - air_damping * (1.0 + thicker)
-    stiffness = (spring - air, spring - air - steeper, spring - air + steeper)
+    stiffness = [spring - air]
+    if steeper.any():
+        stiffness += [spring - air - steeper, spring - air + steeper]
     windy = np.max([still, *(_largest_root(one, loss, inertia) for one in stiffness)], axis=0)
     return np.asarray(np.where(fastest == 0.0, still, windy), np.float64)
 
@@ -232,6 +234,8 @@ def _body_rates(rig: Rig, runs: SettingsTable) -> Array:
 def _slope(runs: SettingsTable, name: str, textbook: float, x: Array, reference: float) -> Array:
     """Magnitude of the slope at x of a power term, by run."""
     coefficient = np.abs(runs[name])
+    if not coefficient.any():
+        return coefficient
     # the aerodynamic factor multiplies the angle itself, which adds one to the exponent
     beside = 1.0 if name == "moment_cubic" else 0.0
     given = runs[f"{name}_exponent"]
