@@ -367,7 +367,8 @@ def _unknown_keys(data: Any, known: Any) -> Iterator[str]:
 def _by_field(data: Mapping[str, Any]) -> dict[str, Any]:
     """The document, with findings that stand elsewhere in it also under their fields."""
     friction = (data.get("maps") or {}).get("friction")
-    return {**data, "waterfall": data, "decision": data, "friction": friction}
+    beside = {name: value for name, value in data.items() if name != "maps"}  # the longest part
+    return {**data, "waterfall": beside, "decision": beside, "friction": friction}
 
 
 @cache
