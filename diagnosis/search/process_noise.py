@@ -395,6 +395,8 @@ def with_response(fit: Fit, spectrum: Spectrum) -> Data | None:
     runs = list(fit.problem.data.runs)
     acts = [i for i, run in enumerate(runs) if any(part.source.acts(run) for part in spectrum)]
     channels = {i: c for i in acts if (c := _channel(fit, i, 0.0)) is not None}
+    if not channels:
+        return None
     filters = _filters(list(channels.values()), [spectrum])
     for (i, channel), (numerator, denominator, spread) in zip(channels.items(), filters, strict=True):
         if not (np.isfinite(spread) and spread > 0.0):
@@ -402,7 +404,7 @@ def with_response(fit: Fit, spectrum: Spectrum) -> Data | None:
         before = runs[i].noise
         noise = NoiseWithMoment(before.variance * spread / channel.variance, before, numerator, denominator)
         runs[i] = replace(runs[i], noise=noise)
-    return fit.problem.data.with_runs(tuple(runs)) if channels else None
+    return fit.problem.data.with_runs(tuple(runs))
 
 
 def _channels(fit: Fit) -> list[_Channel]:

@@ -35,7 +35,10 @@ def answered(
     names: tuple[str, ...], channel: str | None, reason: str, condition: str, probability: float = 0.9
 ) -> dict[str, Any]:
     """The document of causes beside a place."""
-    one, kinds = document() | {"maps": None}, [effect_class(name) for name in names]  # no sentence reads the maps
+    one, kinds = (
+        document() | {"maps": None},
+        [effect_class(name) for name in names],
+    )  # no sentence reads the maps
     against = judged(channel, reason, kinds, scattering=False)
     place = one["found"]["place"] | vars(against) | {"compared": list(names)}
     place |= {"channel": {"kind": reason, **FIGURES}, "condition": {"kind": WINDS[condition], **FIGURES}}

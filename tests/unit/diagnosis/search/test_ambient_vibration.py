@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 from diagnosis.findings.averaged_coefficients import coefficients, possible_answers
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import investigate
-from diagnosis.search.process_noise import is_of_reading, likeliest, random_moments
+from diagnosis.search.process_noise import is_of_reading, likeliest, random_moments, with_response
 from diagnosis.search.random_moments import obeys_a_law, weigh_random_moments
 from diagnosis.search.random_spectra import (
     LONGEST_BANDWIDTH,
@@ -341,4 +341,5 @@ def test_the_moment_of_the_surroundings_has_the_scale_of_the_rig() -> None:
 def test_a_moment_of_the_stream_is_not_sought_without_wind() -> None:
     base = nominal(shaken(of(STILL), STILL, moment=0.02))
     assert random_moments(base, STREAM) == []
+    assert with_response(base, (SpectrumPart(0.01, BANDWIDTH),)) is None
     assert random_moments(base, SURROUNDINGS)
