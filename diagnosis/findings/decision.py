@@ -38,29 +38,32 @@ class Doubt:
     kind: str
     share: float | None
 
-    @property
-    def words(self) -> str:
-        """The reason, as a predicate of the answer."""
-        return _DOUBTS[self.kind](self.share or 0.0)
+    def words(self, *, one: bool) -> str:
+        """The reason, as a predicate of the answer.
+
+        Args:
+            one: whether the answer is one effect.
+        """
+        return _DOUBTS[self.kind](self.share or 0.0, "s" if one else "")
 
 
-def _little(explained: float) -> str:
-    return f"explains only {share(explained)}" if explained > 0.0 else "explains nothing"
+def _little(explained: float, s: str) -> str:
+    return f"explain{s} only {share(explained)}" if explained > 0.0 else f"explain{s} nothing"
 
 
-_DOUBTS: Mapping[str, Callable[[float], str]] = {
-    "held out": lambda found: f"{_little(found)} of the gap on held-out readings",
-    "ahead": lambda found: (
-        f"{_little(found)} of the gap in the later half of the runs, fitted to the earlier"
+_DOUBTS: Mapping[str, Callable[[float, str], str]] = {
+    "held out": lambda found, s: f"{_little(found, s)} of the gap on held-out readings",
+    "ahead": lambda found, s: (
+        f"{_little(found, s)} of the gap in the later half of the runs, fitted to the earlier"
     ),
-    "patched": lambda found: f"{_little(found)} of the gap when written into the model and simulated",
-    "under load": lambda found: (
-        f"leaves {share(found)} of the gap: friction under load may follow another law"
+    "patched": lambda found, s: f"{_little(found, s)} of the gap when written into the model and simulated",
+    "under load": lambda found, s: (
+        f"leave{s} {share(found)} of the gap: friction under load may follow another law"
     ),
-    "left": lambda found: f"leaves a residual of {share(found)} of the swing",
-    "elsewhere": lambda _: "the residuals point elsewhere",
+    "left": lambda found, s: f"leave{s} a residual of {share(found)} of the swing on held-out readings",
+    "elsewhere": lambda *_: "the residuals point elsewhere",
 }
-"""Reasons for not deciding on the best-fitting answer, by kind; each takes the share found."""
+"""Reasons for not deciding on the best-fitting answer, by kind, from the share found and the ending of the verb."""
 
 
 @dataclass(frozen=True)
@@ -143,8 +146,9 @@ class Decision:
         together = probability(sum(value for _, value in self.credible))
         if self.unpredictive:
             best = among_answers(self.unpredictive).capitalize()
-            fit = "fits" if len(without_scatter(self.unpredictive.split(" + "))) == 1 else "fit"
-            said += f"{best} {fit} best, but {' and '.join(one.words for one in self.doubts)}"
+            alone = len(without_scatter(self.unpredictive.split(" + "))) == 1
+            doubts = " and ".join(doubt.words(one=alone) for doubt in self.doubts)
+            said += f"{best} fit{'s' if alone else ''} best, but {doubts}"
             said += f": look at {runs} there first. " if self.in_doubt_of_place else ". "
         return (
             f"{said}The answer is one of these, with a total probability of {together}: {self._likeliest()}."
@@ -156,7 +160,9 @@ class Decision:
         answers = [f"{among_answers(effect)} ({probability(value)})" for effect, value in shown]
         if more := len(self.credible) - len(shown):
             answers.append(f"{more} more")
-        return answers[0] if len(answers) == 1 else f"{', '.join(answers[:-1])} or {answers[-1]}"
+        if len(answers) <= 2:
+            return " or ".join(answers)
+        return f"{'; '.join(answers[:-1])}; or {answers[-1]}"  # an answer is itself a list
 
     def to_json_dict(self) -> dict[str, Any]:
         """The fields ``decided``, ``unpredictive``, ``doubts``, ``credible`` and ``common`` of a document."""

@@ -161,7 +161,9 @@ def test_below_one_half_no_set_is_named_as_the_cause():
     assert "Its cause is undecided" in text
     assert "explain the gap" not in text
     assert "The likely answers contain coulomb friction (93 %)." in text
-    assert "coulomb friction and gravity stiffness (35 %), " in text
+    assert (
+        "gravity stiffness (35 %); coulomb friction and cubic stiffness (33 %); or coulomb friction" in text
+    )
     assert "with a total probability of 93 %" in text
     assert "explain the gap" in said(*causes, answers=((" + ".join(causes), 0.5), ("unknown", 0.5)))
 
@@ -176,7 +178,7 @@ def test_of_many_likely_answers_five_are_said_and_the_others_counted():
         "gravity_stiffness",
     )
     text = said(*names[:1], answers=tuple((name, 1.0 / 6.0) for name in names))
-    assert "mains hum (17 %), coulomb friction (17 %) or 1 more." in text
+    assert "mains hum (17 %); coulomb friction (17 %); or 1 more." in text
     assert "gravity" not in text
 
 
@@ -214,7 +216,7 @@ def test_the_credible_set_is_the_smallest_with_nine_tenths():
             Predictions(held_out=0.98, under_load=0.02),
             "leaves 2.0 % of the gap: friction under load may follow another law",
         ),
-        (Predictions(held_out=0.98, left=0.16), "leaves a residual of 16.0 % of the swing"),
+        (Predictions(held_out=0.98, left=0.16), "leaves a residual of 16.0 % of the swing on held-out"),
         (Predictions(held_out=0.2, ahead=0.2, patched=0.2, left=0.09), ""),
         (Predictions(), ""),
     ],
@@ -229,6 +231,15 @@ def test_an_answer_that_predicts_nothing_is_undecided(predictions, doubt):
     assert ("Free play fits best, but" in words) is bool(doubt)
     assert doubt in words
     assert decision((("unknown", 0.9), ("free_play", 0.1)), Settings().answer, predictions).decided
+
+
+def test_the_verbs_of_a_doubt_agree_with_the_number_of_causes():
+    answers = (("coulomb_friction + gravity_stiffness", 0.71), ("unknown", 0.29))
+    words = decision(answers, Settings().answer, Predictions(held_out=0.05, left=0.22)).words("the runs")
+    assert words.partition(". The answer")[0].endswith(
+        "fit best, but explain only 5.0 % of the gap on held-out readings and leave a residual of 22.0 % of the "
+        "swing on held-out readings"
+    )
 
 
 def test_an_undecided_answer_is_undecided_on_every_page():
