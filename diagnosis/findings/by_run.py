@@ -99,14 +99,17 @@ class SizeByRun:
     @property
     def words(self) -> str:
         """Whether the runs agree on it, in sentences."""
-        size, number = self.common, counted(len(self.runs), "run")
-        text = f"{sentence_case(plain(self.effect))}: {for_people(size.value, size.std, size.unit)} in all runs. "
+        size, runs = self.common, f"the {counted(len(self.runs), 'run')} that show it"
+        text = f"{sentence_case(plain(self.effect))}: "
         if self.agrees:
-            text += f"The {number} that show it agree (p {p_text(self.p_value)})."
-        else:
             text += (
-                f"The {number} that show it differ by {percent_of(self.spread)} beyond their errors "
-                f"(p {p_text(self.p_value)}), {self.farthest} the most: its law has another form, or a run is odd."
+                f"{runs} agree on {for_people(size.value, size.std, size.unit)} (p {p_text(self.p_value)})."
+            )
+        else:  # the noise alone is not the error of a size on which the runs differ
+            text += (
+                f"{for_people(size.value, None, size.unit)} fits all runs best, but {runs} differ by "
+                f"{percent_of(self.spread)} beyond their errors (p {p_text(self.p_value)}), {self.farthest} the "
+                "most: its law has another form, or a run is odd."
             )
         if self.silent:
             text += f" {sentence_case(counted(len(self.silent), 'run'))} cannot show it."

@@ -92,7 +92,7 @@ def test_the_finding_is_said_drawn_and_read_back(answer: Diagnosis) -> None:
     assert cause.common.unit == "1/rad2"
     (section,) = (one for one in sections(answer) if one.key == "by-run")
     (detail,) = (block for block in section.blocks if isinstance(block, Detail))
-    assert "The 6 runs that show it agree" in detail.blocks[0].text  # type: ignore[union-attr]
+    assert "Cubic stiffness: the 6 runs that show it agree on 0.300" in detail.blocks[0].text  # type: ignore[union-attr]
     assert answer.pictures["by-run"].draw() is not None
     assert Diagnosis.from_json_dict(answer.to_json_dict()).by_run == answer.by_run
 
@@ -104,4 +104,7 @@ def test_a_run_of_another_size_is_said_to_differ(answer: Diagnosis) -> None:
     differs = replace(cause, runs={**cause.runs, "r2": odd}, p_value=1e-9, spread=0.2)
     first = CausesByRun((differs,)).section(answer).blocks[0]
     assert isinstance(first, Paragraph)
+    assert first.text.startswith(
+        "Cubic stiffness: 0.300 1/rad² fits all runs best, but the 6 runs that show it"
+    )
     assert "differ by 20 % beyond their errors (p = 1e-09), r2 the most" in first.text
