@@ -143,7 +143,7 @@ def _together(given: Combination | None, second: str, symbols: Mapping[str, str]
     apart = max(ends[1] - ends[0], 1e-6 * abs(ends[1])) or 1.0
     digits = 2 + max(math.floor(math.log10(max(abs(ends[1]), apart) / apart)), 0)
     low, high = (significant(end, digits) for end in ends)
-    unit = "" if given.unit == "1" else f" {given.unit}"
+    unit = "" if given.unit == "1" else f" {unit_mark(given.unit)}"
     size = f"{with_std(given.value, given.std)}{unit}"
     return (
         f"What the runs determine: {whole} + {significant(given.factor, 3)} × {second} = {size}; of it "

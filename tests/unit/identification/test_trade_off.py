@@ -157,6 +157,8 @@ def test_the_combination_of_least_variance_is_stated_and_the_split_respects_the_
         "What the runs determine: the whole damping ratio, ζ + 0.500 × structural damping (loss factor) = "
         "0.00310 ± 0.00010; of it structural damping (loss factor) contributes 0 to 0.0031. What trades off: "
     )
+    squared = replace(pair, together=replace(found, unit="1/s2"))
+    assert " ± 0.00010 1/s²; of it " in trade_off_line(squared, {})
     assert Combination.of("a", values, np.abs(matrix), np.zeros((2, 2)), "1") is None  # they do not add up
 
 
