@@ -15,7 +15,7 @@ from diagnosis.findings.finding import Judged, Picture
 from diagnosis.findings.hidden import Hidden
 from diagnosis.findings.judgements import Estimates
 from diagnosis.findings.terms import KINDS, scattering
-from diagnosis.likelihood.ceiling import Ceiling
+from diagnosis.likelihood.ceiling import INCLUDED_IN, Ceiling
 from diagnosis.noise.gap import gap_test
 from diagnosis.remainder.closable import Closable, Curve, Law, Line
 from diagnosis.remainder.explain import COMMON_FIRST
@@ -192,9 +192,9 @@ def closable_words(closable: Closable | None, judged: Judged) -> str:
     """A few sentences on the explainable part of the remainder; empty where it is not known."""
     if closable is None:
         return ""
-    named = judged.causes != UNKNOWN and judged.decided
-    beyond = " beyond the scatter between runs" if scattering(judged.causes) else ""
-    gap_words = "the residual gap" if named else f"the gap{beyond}"
+    gap_words = f"the {_gap(judged)}"
+    if gap_words == "the gap" and scattering(judged.causes):
+        gap_words += " beyond the scatter between runs"
     ceilings = closable.ceilings
     if closable.kind == "noise":
         most = max(
@@ -213,8 +213,9 @@ def _largest(closable: Closable, ceilings: Sequence[Ceiling], gap_words: str) ->
     """The share that this kind explains beyond the other kinds, its place, and its formula."""
     kind, where, law = closable.kind, closable.events, closable.law
     best = next(ceiling for ceiling in ceilings if ceiling.kind == kind)
+    measured = "measured" if law is None else "estimated without a formula,"
     sentences = [
-        f"{KINDS[kind].capitalize()} could explain {percent(best.closed, best.std)} of {gap_words} (measured on "
+        f"{_as_subject(kind)} could explain {percent(best.closed, best.std)} of {gap_words} ({measured} on "
         f"held-out {best.held_out})."
     ]
     if closable.alike:
@@ -222,9 +223,16 @@ def _largest(closable: Closable, ceilings: Sequence[Ceiling], gap_words: str) ->
             f"These runs cannot distinguish it from {' or '.join(KINDS[other] for other in closable.alike)}."
         )
     elif closable.next_most is not None:
-        alike = all(ceiling.held_out == best.held_out for ceiling in ceilings)
-        other = f"No other kind{'' if alike else f' measured on {best.held_out}'}"
-        sentences.append(f"{other} would explain more than {percent(max(closable.next_most, 0.0))}.")
+        beside = [one for one in ceilings if one.held_out == best.held_out]
+        alike, known = len(beside) == len(ceilings), all(one.determined() for one in beside)
+        which = [] if alike else [f"measured on {best.held_out}"]
+        which += [] if known else ["with a share that is determined"]
+        more = f"more than {percent(closable.next_most)}" if closable.next_most > 0.0 else "any of it"
+        wider = [
+            one for one in beside if one.kind == INCLUDED_IN.get(kind) and one.closed > closable.next_most
+        ]
+        apart = f"Apart from {KINDS[wider[0].kind]}, which includes it, no" if wider else "No"
+        sentences.append(f"{' '.join([apart, 'other kind', *which])} would explain {more}.")
     if where and kind != "line":
         run = f"run {where[0]['run']} ({where[0]['from_s']:.2f} to {where[0]['to_s']:.2f} s)"
         largest = "" if len(where) == 1 else f"{len(where)} runs, the largest part in "
@@ -234,6 +242,11 @@ def _largest(closable: Closable, ceilings: Sequence[Ceiling], gap_words: str) ->
         explains = percent(law.closed, law.std)
         sentences.append(f"The formula {formula} explains {explains}{_with_values(law)}.")
     return sentences
+
+
+def _as_subject(kind: str) -> str:
+    """A kind of law at the start of a sentence; a comma closes its apposition."""
+    return KINDS[kind].capitalize() + ("," if "," in KINDS[kind] else "")
 
 
 def _with_values(law: Law) -> str:
@@ -276,7 +289,7 @@ def _measured_otherwise(kind: str, ceilings: Sequence[Ceiling]) -> list[str]:
     if most.closed <= best.closed:
         return []
     return [
-        f"{KINDS[most.kind].capitalize()} would explain {percent(most.closed, most.std)}, measured on "
+        f"{_as_subject(most.kind)} would explain {percent(most.closed, most.std)}, measured on "
         f"{most.held_out}. A law common to all runs is preferred if it explains {part(COMMON_FIRST)} of "
         "that share or more, since it can be a property of the rig."
     ]
@@ -297,23 +310,29 @@ def _line(line: Line | None) -> list[str]:
     ]
 
 
-_LABEL = "What could explain the residual gap"
+def closable_title(judged: Judged) -> str:
+    """The heading of the explainable part; without a decided cause, the residual gap is the whole gap."""
+    return f"What could explain the {_gap(judged)}"
+
+
+def _gap(judged: Judged) -> str:
+    return "residual gap" if judged.causes != UNKNOWN and judged.decided else "gap"
 
 
 def closable_line(found: Closable | None, rest: Remainder | None, judged: Judged) -> str:
     """The explainable part, in a line; empty without a gap, or where it is not known."""
     if found:
-        return f"{_LABEL}: {found.words}"
+        return f"{closable_title(judged)}: {found.words}"
     if rest is None or not judged.causes:
         return ""
     if not rest.significant:
-        return f"{_LABEL}: nothing beyond chance (p = {rest.p_value:.2g})."
+        return f"{closable_title(judged)}: nothing beyond chance (p = {rest.p_value:.2g})."
     if any(issubclass(kind, AtRandom) for kind in known_effects() if kind.name in judged.causes):
-        return f"{_LABEL}: not stated, since any law would explain part of a random moment."
+        return f"{closable_title(judged)}: not stated, since any law would explain part of a random moment."
     return ""
 
 
-def closable_table(found: Closable | None) -> TextTable:
+def closable_table(found: Closable | None, judged: Judged) -> TextTable:
     """Share of the remainder that each kind could explain, in per cent, the named kind first.
 
     A table without rows where the remainder is within chance.
@@ -328,7 +347,7 @@ def closable_table(found: Closable | None) -> TextTable:
         )
         for one in ceilings
     ]
-    title = "Share of the residual gap that each kind of law could explain, estimated without a formula"
+    title = f"Share of the {_gap(judged)} that each kind of law could explain, estimated without a formula"
     return TextTable(title, ("kind of law", "share", "held out"), tuple(rows), ("share",))
 
 

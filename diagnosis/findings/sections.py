@@ -38,7 +38,13 @@ from diagnosis.findings.head import Head
 from diagnosis.findings.next_steps import next_steps, rival_lines
 from diagnosis.findings.patch import patch_line, patch_table
 from diagnosis.findings.place import lines_table, place_pictures, place_rows, where_pictures
-from diagnosis.findings.remainder import closable_line, closable_table, formula_line, law_pictures
+from diagnosis.findings.remainder import (
+    closable_line,
+    closable_table,
+    closable_title,
+    formula_line,
+    law_pictures,
+)
 from diagnosis.findings.symbols import symbol_rows
 from diagnosis.findings.terms import named_answer
 from diagnosis.findings.whole import SCHEMA_VERSION, Findings
@@ -193,10 +199,10 @@ def _closable(answer: Findings) -> Section:
     drawn = figures(law_pictures(answer.closable, answer.misfit.unit))
     return Section(
         "closable",
-        "What could explain the residual gap",
+        closable_title(answer),
         (
             Paragraph(closable_line(answer.closable, answer.rest, answer)),
-            closable_table(answer.closable),
+            closable_table(answer.closable, answer),
             Paragraph(formula_line(answer.closable, answer)),
             *drawn,
         ),

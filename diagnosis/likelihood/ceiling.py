@@ -30,6 +30,9 @@ KINDS = (
 )  # fmt: skip
 """Kinds of missing law; ``noise`` where no other kind explains much."""
 
+INCLUDED_IN = {"angle": "state", "rate": "state"}
+"""Kinds that are special cases of another, by that kind."""
+
 
 @dataclass(frozen=True)
 class Ceiling:

@@ -11,7 +11,17 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from scipy.special import chdtrc
 
-from diagnosis.likelihood.ceiling import GAPS, Ceiling, Evidence, Ridge, Unexplained, gaps, normal, ratio
+from diagnosis.likelihood.ceiling import (
+    GAPS,
+    INCLUDED_IN,
+    Ceiling,
+    Evidence,
+    Ridge,
+    Unexplained,
+    gaps,
+    normal,
+    ratio,
+)
 from diagnosis.likelihood.paths import COMMON, OF_READING, SINGLE, Path, Places, paths
 from diagnosis.likelihood.residuals import block_gain, resonance, smooth_spectra
 from diagnosis.model.similarity import Similarity
@@ -151,7 +161,7 @@ def _others(kind: str, ceilings: tuple[Ceiling, ...]) -> tuple[tuple[str, ...], 
     best = next((ceiling for ceiling in ceilings if ceiling.kind == kind), None)
     if best is None:
         return (), None
-    included = (kind, "state") if kind in ("angle", "rate") else (kind,)
+    included = (kind, INCLUDED_IN.get(kind))
     others = [
         ceiling
         for ceiling in ceilings

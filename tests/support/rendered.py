@@ -46,7 +46,7 @@ def closable_line(answer: Findings) -> str:
 
 
 def closable_table(answer: Findings) -> TextTable:
-    return remainder.closable_table(answer.closable)
+    return remainder.closable_table(answer.closable, answer)
 
 
 def scatter_words(answer: Findings) -> str:

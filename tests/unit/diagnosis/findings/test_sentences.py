@@ -253,13 +253,28 @@ def test_what_could_be_closed(given: Document) -> None:
     table = closable_table(findings_of(given | {"closable": CLOSABLE | {"kind": "rate", "ceilings": larger}}))
     assert "at most" not in table.title
     assert table.rows[0] == (KINDS["rate"], "31.0 ± 3.0 %", "runs")  # the kind of the sentence comes first
+    assert table.title.startswith("Share of the residual gap that each kind")
     assert text(alike=["rate"]).endswith("cannot distinguish it from a moment of the rate alone.")
+    general = [*CEILINGS, {"kind": "state", "closed": 0.86, "std": 0.01, "held_out": "runs"}]
+    assert text(ceilings=general).endswith(
+        "Apart from a moment of angle and rate, which includes it, no other kind measured on runs would explain "
+        "more than 31.0 %."
+    )
+    vague = [*CEILINGS, {"kind": "time", "closed": 0.2, "std": 0.9, "held_out": "runs"}]
+    assert text(ceilings=vague, next_most=-0.02).endswith(
+        "No other kind measured on runs with a share that is determined would explain any of it."
+    )
+    timed = [CEILINGS[0] | {"kind": "time"}]
+    assert text(kind="time", ceilings=timed).startswith(
+        "A moment in time, equal in all runs, could explain 85.0"
+    )
     stated = {"moment": "k*b^n", "parameters": {"k": {"unit": "N m"}, "n": {"unit": "1"}}}
     values = {"k": {"value": -0.2457, "std": 0.0012}, "n": {"value": 3.0, "std": 0.02}}
     law = {"effect": stated, "parameters": values, "closed": 0.8, "std": 0.01}
     assert text(law=law).endswith(
         "The formula k*b^n explains 80.0 ± 1.0 %, with k = -0.2457 ± 0.0012 N m and n = 3.000 ± 0.020."
     )
+    assert text(law=law).startswith(first.replace("(measured", "(estimated without a formula,"))
     flat = law | {
         "parameters": values | {"d": {"value": 0.0, "std": 6e135}, "q": {"value": 0.34, "std": 0.0}}
     }
@@ -284,6 +299,9 @@ def test_what_could_be_closed(given: Document) -> None:
     )
     given["decided"] = False
     assert " % of the gap (measured" in text()
+    undecided = findings_of(given | {"closable": CLOSABLE}).in_words()
+    assert "\nWhat could explain the gap: A moment of the angle alone could" in str(undecided)
+    assert closable_table(undecided).title.startswith("Share of the gap that each kind")
     assert closable_words(findings_of(given | {"closable": None})) == ""
 
 
