@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -18,6 +18,7 @@ from diagnosis.where.along_motion import drift
 from diagnosis.where.excess import RunExcess, band_excesses, run_excesses, shortest_interval
 from diagnosis.where.survey import Survey, survey
 from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.record import Array
 
 NAMED_RUN: Final = 0.1
 """Minimum excess of a further run to be named, as a share of the largest excess. Judgement."""
@@ -93,21 +94,26 @@ def locate(campaign: Campaign, nominal: Fit, *, hum_removed: bool = False, noise
         noise_ratio: noise variance of the fit over the reference. A step of the readings that is coarser than
             stated raises the noise found in the records, and the stated noise is then the reference.
     """
-    data, residuals = nominal.problem.data, nominal.residuals
+    data, hum = nominal.problem.data, dict[str, Array]()
     if hum_removed:
         variance = {run.id: run.noise.variance for run in data.runs}
         given = prepare(campaign, variance, data.similarity, model=data.model, settings=data.settings)
         readings = {run.id: run.reading for run in given.runs}
         # the fit may leave out the start of a record; both end together
-        residuals = [
-            r + run.scaled(readings[run.id][-run.reading.size :] - run.reading)
-            for r, run in zip(residuals, data.runs, strict=True)
-        ]
-    scaled = replace(nominal, residuals=[r * np.sqrt(noise_ratio) for r in residuals])
+        hum = {run.id: run.scaled(readings[run.id][-run.reading.size :] - run.reading) for run in data.runs}
+
+    def whole(fitted: Fit) -> Fit:
+        """A fit with the residuals of the whole gap, in deviations of the reference noise."""
+        runs = zip(fitted.problem.data.runs, fitted.residuals, strict=True)
+        return replace(
+            fitted, residuals=[(r + hum.get(run.id, 0.0)) * np.sqrt(noise_ratio) for run, r in runs]
+        )
+
+    scaled = whole(nominal)
     excesses = run_excesses(campaign, scaled)
     runs = runs_beyond_chance(excesses, nominal.settings.where)
     found = survey(nominal, scaled, excesses, runs)
-    condition = infer_condition(campaign, nominal, found)
+    condition = infer_condition(campaign, nominal, found, whole)
     return Place(found, runs, infer_channel(nominal, found, condition.value), condition)
 
 
@@ -118,8 +124,14 @@ def runs_beyond_chance(excesses: Sequence[RunExcess], chosen: WhereSettings) -> 
     return tuple(name for name, excess in clear.items() if excess > least)
 
 
-def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Conclusion:
-    """Whether the gap needs wind: ``wind_on`` if the wind-off runs, fitted alone, show no gap."""
+def infer_condition(
+    campaign: Campaign, nominal: Fit, found: Survey, whole: Callable[[Fit], Fit]
+) -> Conclusion:
+    """Whether the gap needs wind: ``wind_on`` if the wind-off runs, fitted alone, show no gap.
+
+    Args:
+        whole: adds the parts of the gap that are removed before a fit.
+    """
     runs, shown, chosen = nominal.problem.data.runs, found.maps.runs, nominal.settings.where
     off = tuple(run.id for run in nominal.problem.data.in_still_air)
     if len(off) == len(runs):
@@ -137,7 +149,7 @@ def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Conclusi
         alone = fit(Problem(data), nominal_start(data))
     except FitError:
         return Conclusion(None, Fact("wind-off runs not fitted"))
-    excesses = run_excesses(campaign, alone)
+    excesses = run_excesses(campaign, whole(alone))
     tests = [run.p_value() for run in excesses]
     tests += [band.p_value for band in band_excesses(excesses)]
     if min(tests) * len(tests) < chosen.still_rate:

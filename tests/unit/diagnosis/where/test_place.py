@@ -118,7 +118,7 @@ def test_hum_in_the_records_is_found_though_the_fit_had_it_taken_out():
     clean = campaign()
     hum = 5e-4 * np.sin(2.0 * np.pi * 50.0 * INTERVAL * np.arange(round(DURATION / INTERVAL)))
     where, maps, _ = localise(studied(campaign(added=hum), nominal(clean), ("mains_hum",)))
-    assert where.channel == "sensor"
+    assert (where.channel, where.condition) == ("sensor", "always")
     assert where.frequency_hz is not None
     assert where.frequency_hz[0] < 50.0 < where.frequency_hz[1]
     assert where.frequency_hz[1] - where.frequency_hz[0] < 1.0
@@ -381,7 +381,9 @@ def test_one_windy_run_of_three_or_more_with_nearly_all_of_the_gap_says_nothing_
         for run, share in zip(found.maps.runs, shares, strict=True)
     ]
     found = dataclasses.replace(found, maps=dataclasses.replace(found.maps, runs=tuple(runs)))
-    assert (infer_condition(data, base, found).reason == Fact("one run", {"run": "r2"})) == lone
+    assert (
+        infer_condition(data, base, found, lambda fitted: fitted).reason == Fact("one run", {"run": "r2"})
+    ) == lone
 
 
 @pytest.mark.parametrize("turned", [0.0, 0.5 * np.pi])
