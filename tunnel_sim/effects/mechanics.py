@@ -306,7 +306,7 @@ class QuadraticDamping(Effect):
     place = 2
     channel = "damping"
     condition = "always"
-    size = "a damping moment of {coefficient} that grows with the square of the rate"
+    size = "a damping moment of {coefficient} that grows with {power}"
     advice = "Model the damping that grows with the rate"
     equation = "−C2 |β̇| β̇; general form: |β̇|^n sgn β̇ for |β̇| β̇"
     signature = "The damping ratio falls in proportion to the amplitude."
@@ -321,6 +321,13 @@ class QuadraticDamping(Effect):
     exponent: float = exponent(
         "n", "power of the rate in the moment (unchanged at 2 rad/s)", 2.0, fit_lower=1.0
     )  # with a lower power it would be dry friction
+
+    @classmethod
+    def phrase(cls, values: Mapping[str, float], stds: Mapping[str, float | None], text: Text) -> str:
+        """The damping moment, with the fitted power of the rate where it is not the square."""
+        power = f"{values.get('exponent', 2.0):.1f}"
+        said = "the square of the rate" if power == "2.0" else f"the rate to the power of {power}"
+        return super().phrase(values, stds, text).replace("{power}", said)
 
 
 _AFTER_EFFECT = parse("size*log((t + lead)/length)", frozenset({"size", "t", "lead", "length"}))

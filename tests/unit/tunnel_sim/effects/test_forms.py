@@ -211,6 +211,20 @@ def test_the_form_of_friction_is_said(form: dict[str, float], said: str) -> None
     assert kind.phrase({"friction_moment": 0.02, **form}, {}, lambda v, _std, unit: f"{v:g} {unit}") == said
 
 
+@pytest.mark.parametrize(
+    ("form", "power"),
+    [
+        ({}, "the square of the rate"),
+        ({"exponent": 2.04}, "the square of the rate"),
+        ({"exponent": 4.08}, "the rate to the power of 4.1"),
+    ],
+)
+def test_the_power_of_a_damping_moment_is_said(form: dict[str, float], power: str) -> None:
+    kind = effect_class("quadratic_damping")
+    said = kind.phrase({"coefficient": 0.02, **form}, {}, lambda v, _std, unit: f"{v:g} {unit}")
+    assert said == f"a damping moment of 0.02 N m s2/rad2 that grows with {power}"
+
+
 def test_a_presliding_range_is_said_where_it_is_more_than_its_error() -> None:
     def said(std: float | None, **form: float) -> str:
         given = {"friction_moment": 0.02, "presliding": 0.01, **form}
