@@ -64,6 +64,11 @@ class Coefficients:
     note: str = ""
     correlation: tuple[tuple[float, ...], ...] = ()
 
+    @property
+    def comparable(self) -> Mapping[str, Quantity]:
+        """The coefficients with the causes that compare with the nominal ones: in phase, where a lag is named."""
+        return {**self.after, **self.in_phase}
+
     def pictures(self) -> tuple[Picture, ...]:
         """The coefficients that the runs determine, before and after; none without any."""
         description = "Coefficients before and after the causes are added, with 95 % intervals."
@@ -261,11 +266,11 @@ def consequence(given: Coefficients, judged: Judged) -> str:
         return ""
     phase = given.in_phase
     for name, before in given.before.items():
-        after = {**given.after, **phase}.get(name)
+        after = given.comparable.get(name)
         if after is None or not before.value or not (before.determined and after.determined):
             continue
         label = COEFFICIENTS.get(name, name)
-        if after.std is not None and after.std > _OPEN * abs(after.value):
+        if after.std is not None and after.std > OPEN * abs(after.value):
             clauses.append(
                 f"{label} remains uncertain ({for_people(after.value, after.std, unit_mark(after.unit))})"
             )
@@ -297,7 +302,7 @@ def _of_the_rate(given: Coefficients) -> str:
     )
 
 
-_OPEN = 0.5  # standard deviation, as a share of the value, above which its change is meaningless
+OPEN = 0.5  # standard deviation, as a share of the value, above which its change is meaningless
 
 
 def _apart(before: float, after: float) -> str:

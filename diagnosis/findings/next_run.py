@@ -96,11 +96,12 @@ class NextRun(PlannedRun):
     def between(cls, first: Fit, second: Fit) -> NextRun | None:
         """The run that separates two models fitted to the same runs.
 
-        The rig can make the run: its spring, wind speed and angle are those of existing runs.
+        The rig can make the run: its spring, wind speed and angle are those of existing runs, but not all of one
+        run. Both models explain that run already, and its like would decide no more.
 
         Returns:
-            None where no stiffness is known, or where a free decay cannot separate the models: every run is
-                driven, or the models differ in an effect of the input.
+            None where no stiffness is known, where every such run is made, or where a free decay cannot separate
+                the models: every run is driven, or the models differ in an effect of the input.
         """
         data = first.problem.data
         differ = set(first.problem.effects) ^ set(second.problem.effects)
@@ -115,6 +116,8 @@ class NextRun(PlannedRun):
                 first, spring_stiffness=spring, wind_speed=speed, air_density=density, duration=duration
             )
             for angle in (share * data.swing for share in _ANGLES):
+                if _made(first, run, angle):
+                    continue
                 apart = separation(first, second, run, angle)
                 if apart is not None:
                     found.append(cls(spring, speed, angle, duration, apart))
@@ -280,6 +283,21 @@ def planned_run(
         start=0.0,
         samples=None,
     )
+
+
+def _made(fit: Fit, planned: RunData, angle: float) -> bool:
+    """Whether a run of the same spring, wind speed and release angle exists, and is not much shorter."""
+    return any(
+        run.spring_stiffness == planned.spring_stiffness
+        and abs(run.wind_speed - planned.wind_speed) <= _ALIKE * planned.wind_speed
+        and abs(abs(own[0]) - angle) <= _ALIKE * angle
+        and run.duration >= _SHORT * planned.duration
+        for run, own in zip(fit.problem.data.runs, fit.point.per_run, strict=True)
+    )
+
+
+_ALIKE = 0.2  # relative difference of a wind speed or an angle that makes no other run
+_SHORT = 0.3  # share of a duration
 
 
 def separation(first: Fit, second: Fit, run: RunData, angle: float) -> float | None:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from diagnosis.findings.closure import shares_of_gap
+from diagnosis.findings.coefficients import OPEN
 from diagnosis.findings.disturbed_runs import disturbed_step
 from diagnosis.findings.finding import NextStep
 from diagnosis.findings.input_hold import hold_steps
@@ -122,8 +123,10 @@ def _corrects(answer: Findings) -> str:
     """The changes of the coefficients by the only cause, if they are at least a per cent, after a blank."""
     given, found = answer.coefficients, []
     for name, one in given.before.items():
-        two = {**given.after, **given.in_phase}.get(name)
+        two = given.comparable.get(name)
         if two is None or not (one.determined and two.determined) or one.value * two.value <= 0.0:
+            continue
+        if two.std is not None and two.std > OPEN * abs(two.value):
             continue
         change = abs(relative_change(one.value, two.value))
         if _VISIBLE <= change < 1.0 and not two.agrees(one.value):
@@ -157,8 +160,10 @@ def unplannable(answer: Findings) -> str:
     known = answer.coefficients.before
     if answer.found.driven:
         return f"No run is planned for driven runs: {OTHER_INPUT}."
-    if not known:
-        return "No run can be planned: the nominal model was not fitted to any run."
+    if answer.cycling:
+        return "No run can be planned: no run is a free decay."
+    if any(remark.withholds for remark in answer.remarks):
+        return "No run can be planned before the stated values are corrected."
     if "omega_n" in known:
         return "No run can be planned, because no spring is stated: state spring_stiffness for every run."
     return ""
@@ -182,9 +187,13 @@ def rival_lines(answer: Findings) -> list[str]:
         lines.append(f"{which}: {run.words(answer.freedom, robot=answer.found.robot)}.")
     elif rivals and answer.found.driven:
         lines.append(f"To distinguish them, {OTHER_INPUT}.")
-    elif rivals:
+    elif rivals and unplannable(answer):
         lines.append(
             "A run that would distinguish them cannot be computed: state every spring_stiffness, or add runs."
+        )
+    elif rivals:
+        lines.append(
+            "The springs, wind speeds and release angles of this campaign do not distinguish them: add others."
         )
     return lines
 
@@ -254,7 +263,7 @@ def _remedies(remarks: Sequence[Remark]) -> list[NextStep]:
 def _narrowing(answer: Findings) -> Iterator[NextStep]:
     """For each source of a wide interval, the step that narrows it, and the resulting interval."""
     runs, found = answer.further_runs, dict[str, list[str]]()
-    for name, one in {**answer.coefficients.after, **answer.coefficients.in_phase}.items():
+    for name, one in answer.coefficients.comparable.items():
         source = source_of_width(name, one)
         if source in _NARROWS:
             part = _CUT.get(source, 1.0)

@@ -50,6 +50,7 @@ def test_both_parts_are_said_and_the_sum_is_compared_with_the_nominal_model():
         "The size of Cnr changes by less than 1 %. Of Cnr in phase with the rate, −0.36000 ± 0.00020, the lag "
         "contributes −0.217 and the rate itself −0.143 ± 0.049."
     )
+    assert findings_of(given).coefficients.comparable["cn_r"].value == -0.36
     whole, own = coefficients_table(findings_of(given)).rows
     assert "in phase with the rate" in whole[0]
     assert "beside the lag" in own[0]

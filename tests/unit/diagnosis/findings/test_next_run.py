@@ -123,6 +123,26 @@ def test_the_separation_is_the_least_over_the_rival_s_phases(shedding):
     assert separation(first, second, run, 0.35) == pytest.approx(min(misses), rel=0.1)
 
 
+def test_a_run_that_is_made_is_not_proposed_again(rivals):
+    """The fits explain it already; a much shorter one does not count."""
+    first, second = rivals
+    found = NextRun.between(first, second)
+    runs, own = first.problem.data.runs, first.point.per_run
+    made = replace(runs[0], wind_speed=found.wind_speed, air_density=1.2, duration=found.duration)
+
+    def beside(run):
+        data = first.problem.data.with_runs((*runs, run))
+        release = np.vstack([own, [found.release_angle, *own[0, 1:]]])
+        point = Point(first.point.common, release)
+        return replace(first, problem=replace(first.problem, data=data), point=point)
+
+    other = NextRun.between(beside(made), second)
+    assert (other.wind_speed, other.release_angle) != (found.wind_speed, found.release_angle)
+    assert other.separation <= found.separation
+    again = NextRun.between(beside(replace(made, duration=0.1 * found.duration)), second)
+    assert (again.wind_speed, again.release_angle) == (found.wind_speed, found.release_angle)
+
+
 def test_runs_without_stiffness_propose_none():
     data = campaign()
     runs = tuple(replace(run, spring_stiffness=None) for run in data.runs[:1])

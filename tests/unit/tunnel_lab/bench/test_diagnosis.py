@@ -138,12 +138,13 @@ def test_the_page_shows_what_is_tried(tmp_path: Path, monkeypatch: pytest.Monkey
             "differ by 0.4 standard deviations",
             True,
         ),
-        ({"next_run": None}, "cannot be computed: state every spring_stiffness", True),
+        ({"next_run": None}, "of this campaign do not distinguish them: add others", True),
         ({"next_run": None, "coefficients": NORMALISED}, "no spring is stated", False),
+        ({"next_run": None, "coefficients": NORMALISED}, "cannot be computed: state every", False),
         (
             {"next_run": None, "coefficients": {"before": {}, "after": {}, "note": ""}},
-            "was not fitted",
-            False,
+            "of this campaign do not distinguish them: add others",
+            True,
         ),
     ],
 )
