@@ -32,7 +32,8 @@ class Answered:
         campaign: the measured campaign.
         study: study of the similar campaign, its causes confirmed.
         before: coefficients of the nominal model, by name, in the units of the measured campaign.
-        after: coefficients with the causes, by the same names.
+        after: coefficients with the causes, by the same names; in phase with the motion, like those before, where
+            a lag is named.
     """
 
     campaign: Campaign

@@ -8,9 +8,9 @@ from functools import partial
 from typing import TYPE_CHECKING, ClassVar
 
 from diagnosis.findings.finding import Answered, Finding, Judged, Picture
-from identification.show.blocks import Paragraph, Section, TextTable
+from identification.show.blocks import Section, TextTable
 from identification.show.drawing import AFTER, BEFORE, NARROW
-from identification.show.numbers import estimated, listed, relative_change, size_change, with_std
+from identification.show.numbers import estimated, relative_change, size_change, with_std
 from identification.show.quantity import INTERVAL, Quantity
 from identification.show.style import figure, grid, styled
 from tunnel_sim.vocabulary.campaign import RigProperties, Run
@@ -65,17 +65,15 @@ class WhatItCosts(Finding):
         return cls(top.wind_speed, tuple(moments)) if moments else None
 
     def section(self, judged: Judged) -> Section:
-        """The moments in a sentence, a table and a figure."""
+        """The moments in a table and a figure."""
         rows = tuple(
             (one.motion, *map(_shown, (one.before, one.after)), _change(one) or "–") for one in self.moments
         )
         heads = ("moment of the air at", "nominal model [N m]", "with the causes [N m]", "change of size")
         title = f"Moments of the air at {self.wind_speed:g} m/s, with 95 % intervals"
-        said = listed([_said(one) for one in self.moments])
-        words = f"At {self.wind_speed:g} m/s the moment of the air is {said}. Here ± spans the 95 % interval."
         table = TextTable(title, heads, rows, right=heads[1:])
         drawn = (one.block for one in self.pictures(judged))
-        return Section("costs", "What the gap costs", (Paragraph(words, "Moments of the air"), table, *drawn))
+        return Section("costs", "What the gap costs", (table, *drawn))
 
     def pictures(self, judged: Judged) -> tuple[Picture, ...]:
         """The moments before and after, a panel each."""
@@ -118,12 +116,6 @@ def _shown(given: Quantity) -> str:
     return estimated(given if given.std is None else replace(given, std=INTERVAL * given.std))
 
 
-def _said(one: AirMoment) -> str:
-    """The moment with the causes as a part of a sentence."""
-    change = _change(one)
-    return f"{_shown(one.after)} N m at {one.motion}" + (f" ({change} by the causes)" if change else "")
-
-
 def _change(one: AirMoment) -> str:
     """The change of a moment's size by the causes, in per cent of the nominal size; empty where one is at a bound.
 
@@ -139,7 +131,9 @@ def _change(one: AirMoment) -> str:
     std = 100.0 * INTERVAL * abs(after.std / before.value)
     if max(abs(change), std) < _NO_CHANGE:
         return f"less than {_NO_CHANGE:g} %"
-    return f"{'+' if change > 0.0 else ''}{with_std(change, std)} %"
+    text = with_std(abs(change), std)
+    nothing = not text.partition(" ")[0].strip("(0.")
+    return f"{'' if nothing else '-' if change < 0.0 else '+'}{text} %"
 
 
 _NO_CHANGE = 0.01  # %: a smaller change is stated as this
