@@ -23,6 +23,7 @@ from diagnosis.likelihood.residuals import linear_coefficients
 from diagnosis.search.answer import UNKNOWN, Answer
 from diagnosis.search.prepared import COARSE_STEP, HUM
 from diagnosis.search.random_spectra import LONGEST_BANDWIDTH
+from diagnosis.search.rivals.two_springs import ONE_SPRING, SpringError
 from diagnosis.search.study import Study
 from diagnosis.settings import GapSettings
 from identification.show.blocks import TextTable
@@ -340,11 +341,26 @@ def _estimate(repeated: RunRepeatability, full: str, candidate: str, given: Quan
     return repeated.spread_estimate(full.rpartition(".")[0] or candidate, given) or estimated(given, mark)
 
 
-def parameters_table(first: Candidate, repeated: RunRepeatability, judged: Judged) -> TextTable:
-    """The parameters of the answer; a table without rows where it has none."""
+def parameters_table(
+    first: Candidate, repeated: RunRepeatability, judged: Judged, choices: Sequence[SpringError] = ()
+) -> TextTable:
+    """The parameters of the answer; a table without rows where it has none.
+
+    Args:
+        choices: springs of which one is off where the runs cannot tell which; each has a row.
+    """
     rows, effect = [], ""
-    for full, given in first.parameters.items():
-        owner, _, name = full.rpartition(".")
+    springs = {
+        f"{ONE_SPRING.name}.error if {one.stiffness:g} N m/rad is off": Quantity(one.error, one.std, "1")
+        for one in choices
+    }
+    fitted = {
+        full: one
+        for full, one in first.parameters.items()
+        if not (springs and full.startswith(ONE_SPRING.name))
+    }
+    for full, given in {**fitted, **springs}.items():
+        owner, _, name = full.partition(".") if "." in full else ("", "", full)
         owner = owner or first.effect
         size = _estimate(repeated, full, first.effect, given)
         rows.append((owner if owner != effect else "", name, size))

@@ -166,7 +166,9 @@ def _causes(answer: Findings) -> Section:
     return Section(
         "found",
         title,
-        (*cards, parameters_table(answer.candidates[0], answer.repeated, answer)) if cards else (),
+        (*cards, parameters_table(answer.candidates[0], answer.repeated, answer, answer.found.choices))
+        if cards
+        else (),
     )
 
 

@@ -21,7 +21,7 @@ def candidates_table(answer: Findings) -> TextTable:
 
 
 def parameters_table(answer: Findings) -> TextTable:
-    return candidates.parameters_table(answer.candidates[0], answer.repeated, answer)
+    return candidates.parameters_table(answer.candidates[0], answer.repeated, answer, answer.found.choices)
 
 
 def inclusion_line(answer: Findings) -> str:

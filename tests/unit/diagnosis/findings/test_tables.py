@@ -97,6 +97,22 @@ def test_parameters_of_the_answer(given: Document) -> None:
     assert rows(parameters_table(findings_of(given))) == []
 
 
+def test_springs_of_which_one_is_off_have_a_row_each(given: Document) -> None:
+    given["candidates"][0] |= {"effect": "coulomb_friction + spring_miscalibration"}
+    given["candidates"][0]["parameters"] = {
+        "spring_miscalibration.error": {"value": 0.02, "std": 1e-6, "unit": "1"},
+        "coulomb_friction.friction_moment": {"value": 0.004, "std": 1e-5, "unit": "N m"},
+        "spring_miscalibration.spring_stiffness": {"value": 44.84, "std": 0.0, "unit": "N m/rad"},
+    }
+    one = {"stiffness": 44.84, "error": 0.02, "std": 1e-4, "probability": 0.5}
+    given["found"]["choices"] = [one, one | {"stiffness": 16.12, "error": -0.0196}]
+    assert rows(parameters_table(findings_of(given))) == [
+        ["coulomb_friction", "friction_moment", "0.004000 ± 0.000010 "],
+        ["spring_miscalibration", "error if 44.84  is off", "0.02000 ± 0.00010"],
+        ["", "error if 16.12  is off", "-0.01960 ± 0.00010"],
+    ]
+
+
 def test_effects_among_the_causes(given: Document) -> None:
     line = inclusion_line(findings_of(given))
     assert line.endswith(": quadratic damping 93 %, coulomb friction 7 %.")
