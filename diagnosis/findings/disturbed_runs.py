@@ -54,7 +54,9 @@ def disturbed_step(found: Disturbance) -> NextStep:
 def odd_runs(found: Sequence[Disturbance]) -> str:
     """Disturbed runs and runs that differ from the others, after a semicolon; empty without any."""
     disturbed = [one.run for one in found if one.at_s is not None]
-    odd = [one.run for one in found if one.at_s is None]
+    late = [one.run for one in found if one.at_s is None and one.kept_from_s is not None and not one.used]
+    odd = [one.run for one in found if one.at_s is None and one.run not in late]
     said = f"; {named_runs(disturbed)} disturbed" if disturbed else ""
+    said += f"; the start of {named_runs(late)} not used" if late else ""
     differ = "differ from the others" if len(odd) > 1 else "differs from the others"
     return said + (f"; {named_runs(odd)} {differ}" if odd else "")

@@ -13,7 +13,7 @@ import pytest
 from scipy.signal import butter, lfilter, lfilter_zi
 
 from diagnosis import diagnose
-from diagnosis.findings.disturbed_runs import disturbed_words
+from diagnosis.findings.disturbed_runs import disturbed_words, odd_runs
 from diagnosis.findings.next_steps import next_steps
 from diagnosis.findings.verdict import headline
 from diagnosis.result import Diagnosis
@@ -105,6 +105,10 @@ def test_a_start_that_is_used_nevertheless_is_not_said_to_be_left_out() -> None:
     words = disturbed_words(Disturbance("r2", None, None, 1e-5, used=True, kept_from_s=0.8), no_gap=False)
     assert words.startswith("Run r2 does not move as the others do at its start. It is used nevertheless")
     assert "not used" not in words
+    late = Disturbance("r3", None, None, 1e-5, kept_from_s=0.8)
+    assert odd_runs([replace(late, run="r2", used=True), late]) == (
+        "; the start of run r3 not used; run r2 differs from the others"
+    )
 
 
 def test_a_run_alone_at_its_spring_or_without_wind_is_not_odd(plain: Campaign) -> None:
