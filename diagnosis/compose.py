@@ -190,7 +190,7 @@ def composed(
         confirmation=closes.confirmation.scaled(similarity.own(1.0, similarity.reading)),
         noise=_noise(study),
         hidden=() if withheld else named.hidden,
-        trade_off=None if withheld else least_separated(fitted, study.campaign),
+        trade_off=None if withheld or cycling else least_separated(fitted, study.campaign),
         blind_spots=() if cycling else study.model.blind_spots(study.nominal.problem.data),
         seconds=seconds,
         maps=maps.rounded(),
@@ -216,7 +216,9 @@ def composed(
         data=chosen.examined,
         motion=chosen.examined.sensor.freedom.motion,
         motion_scale=similarity.angle,
-        **findings_of(Answered(chosen.examined, study, named.coefficients.before, named.coefficients.after)),
+        **findings_of(
+            Answered(chosen.examined, study, named.coefficients.before, named.coefficients.comparable)
+        ),
     )
 
 
@@ -230,7 +232,8 @@ def _caveats(
 ) -> tuple[Fact, ...]:
     """All caveats of an answer, in the order in which they are listed."""
     noise, data = study.prepared.noise, study.campaign
-    of_answer = cautions(data, noise, closes.gap.runs, closes.confirmation, named=study.named)
+    sought = bool(study.causes) and not chosen.limit_cycles
+    of_answer = cautions(data, noise, closes.gap.runs, closes.confirmation, named=study.named, gap=sought)
     zeros = zeros_apart(study) if named.unsure else ()
     return (
         *chosen.left_out,
@@ -485,4 +488,6 @@ def _closable(study: Study, named: _Named, say: Progress) -> tuple[Closable | No
 def _second_modes(study: Study, chosen: Chosen) -> tuple[TwoModes, ...]:
     """Second modes of single runs, if one may be named: sets of stretches have none."""
     able = any(issubclass(kind, SecondOscillation) for kind in study.prepared.kinds)
-    return second_modes(chosen.campaign) if able else ()
+    hum = study.prepared.hum
+    mains = None if hum is None else study.similarity.own(hum.frequency, "Hz")
+    return second_modes(chosen.campaign, mains) if able else ()

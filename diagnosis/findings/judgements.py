@@ -17,7 +17,7 @@ from diagnosis.model.fact import Fact
 from diagnosis.noise.kinds import Noise
 from diagnosis.search.answer import UNKNOWN
 from diagnosis.search.study import Study
-from identification.show.numbers import plain, probability, relative_change, share
+from identification.show.numbers import listed, plain, probability, relative_change, share
 from identification.show.quantity import Quantity
 from tunnel_sim.vocabulary.campaign import Campaign
 
@@ -76,13 +76,13 @@ class Nearly:
             return f"{said}, but irregular noise may explain a gap this small."
         said = f"{said} (probability {probability(self.probability)})"
         if self.rival:
-            return (
-                f"{said}, and {plain(*self.rival)} explains as much ({probability(self.rival_probability)})."
-            )
+            explain = "explain" if len(self.rival) > 1 else "explains"
+            rival = f"{plain(*self.rival)} {explain} as much ({probability(self.rival_probability)})"
+            return f"{said}, and {rival}."
         if self.misfit:
-            left = " and ".join(MISFITS[name] for name in self.misfit)
-            return f"{said}, but leaves a significant misfit of {left}."
-        return f"{said}, which is too little to name it."
+            leave = "leave" if len(self.effects) > 1 else "leaves"
+            return f"{said}, but {leave} a significant misfit of {listed([MISFITS[name] for name in self.misfit])}."
+        return f"{said}, which is too little to name {'them' if len(self.effects) > 1 else 'it'}."
 
 
 Estimates = Mapping[str, Quantity]
@@ -95,10 +95,12 @@ def cautions(
     confirmation: Confirmation,
     *,
     named: bool,
+    gap: bool = True,
 ) -> tuple[Fact, ...]:
     """The caveats of an answer.
 
     Args:
+        gap: whether a cause is sought.
         runs: the gap by run, and whether the run could be held out of the fit.
         confirmation: whether the fits' integrator agrees with the MuJoCo model.
         named: whether the answer names effects; only then are runs held out of a fit.
@@ -114,7 +116,7 @@ def cautions(
         beside = {"run": confirmation.run, "tolerance": INTEGRATOR_TOLERANCE}
         facts.append(Fact("not confirmed", figures | beside))
     windy = bool(campaign.in_wind)
-    if len(campaign.runs) < RUNS_WITHOUT_CAUTION:
+    if gap and len(campaign.runs) < RUNS_WITHOUT_CAUTION:
         kind = {"driven": campaign.driven, "windy": windy}
         facts.append(Fact("few runs", {"runs": len(campaign.runs), **kind}))
     fitted = [run.id for run in runs if not run.held_out]

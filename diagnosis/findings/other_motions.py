@@ -74,8 +74,11 @@ class _Modes:
     left: float  # sum of squared residuals, rad²
 
 
-def second_modes(campaign: Campaign) -> tuple[TwoModes, ...]:
+def second_modes(campaign: Campaign, mains: float | None = None) -> tuple[TwoModes, ...]:
     """Find a second mode in each run that shows one.
+
+    Args:
+        mains: frequency of a hum in the records, Hz; it is no mode, and neither are its harmonics.
 
     Returns:
         One result for each run with a second mode. A second mode is found where two decaying oscillations leave
@@ -110,9 +113,16 @@ def second_modes(campaign: Campaign) -> tuple[TwoModes, ...]:
             main, second = (
                 Mode(float(two.amplitude[i]), float(two.frequency[i]), float(two.rate[i])) for i in order
             )
-            modes.append(TwoModes(run.id, main, second, 1.0 - two.left / one.left))
+            if mains is None or not _is_hum(second.frequency_hz, mains):
+                modes.append(TwoModes(run.id, main, second, 1.0 - two.left / one.left))
             break
     return tuple(modes)
+
+
+def _is_hum(frequency: float, mains: float) -> bool:
+    """Whether a frequency is within a per cent of the mains' or of a multiple of it."""
+    ratio = frequency / mains
+    return abs(ratio - max(1, round(ratio))) < 0.01 * ratio
 
 
 def _fit_modes(values: Array, interval: float, count: int, vectors: Array) -> _Modes | None:
@@ -148,7 +158,9 @@ def second_mode_words(found: Sequence[TwoModes], unit: str) -> str:
         return ""
     runs = [mode.run for mode in found]
     contain = (
-        f"{runs[0]} contains" if len(runs) == 1 else f"{counted(len(runs), 'run')} ({listed(runs)}) contain"
+        f"Run {runs[0]} contains"
+        if len(runs) == 1
+        else f"{counted(len(runs), 'run')} ({listed(runs)}) contain"
     )
     main, second = (
         _modes_words(modes, unit) for modes in zip(*((one.main, one.second) for one in found), strict=True)

@@ -94,6 +94,17 @@ CASES = {
 }
 
 
+def test_runs_that_are_no_decays_have_no_trade_off_and_no_caveat_on_causes():
+    data = replace(campaign(QUADRATIC), runs=campaign(QUADRATIC).runs[-1:])
+    found = investigate(data, ())
+    chosen = Chosen(data, data, found.model, (), (), (), limit_cycles=True)
+    answer = composed(Confirmed.of(found), chosen, Question(None, (), (), lambda _: None))
+    assert answer.trade_off is None
+    assert "few runs" not in [fact.kind for fact in answer.found.cautions]
+    decays = composed(Confirmed.of(found), replace(chosen, limit_cycles=False), Question(None, (), (), print))
+    assert "few runs" in [fact.kind for fact in decays.found.cautions]
+
+
 @cache
 def named():
     """The answer that names one effect, and the progress that was reported."""

@@ -41,7 +41,7 @@ def test_one_sentence_says_the_second_modes_of_all_runs():
     first = TwoModes("a", Mode(0.3, 2.2, 0.1), Mode(0.02, 2.9, 0.2), 0.98)
     text = second_mode_words([first], "rad")
     assert text.startswith(
-        "a contains a second mode: 1.1° at 2.90 Hz, decaying at 0.20 1/s. The main mode is 17° at"
+        "Run a contains a second mode: 1.1° at 2.90 Hz, decaying at 0.20 1/s. The main mode is 17° at"
     )
     assert "explains 98 % of the residual" in text
     other = TwoModes("b", Mode(0.15, 3.3, 0.1), Mode(0.04, 2.9, 0.3), 0.6)
@@ -51,6 +51,11 @@ def test_one_sentence_says_the_second_modes_of_all_runs():
         "The main mode is 8.6 to 17° at 2.20 to 3.30 Hz, decaying at 0.10 1/s. The second mode explains 60 to 98 %"
     )
     assert second_mode_words([], "rad") == ""
+
+
+@pytest.mark.parametrize(("mains", "named"), [(2.91, False), (1.46, False), (2.5, True), (50.0, True)])
+def test_a_hum_and_its_harmonics_are_no_mode(mains, named):
+    assert bool(second_modes(campaign(MOTION, (0.02, 2.9, 0.2)), mains)) is named
 
 
 @pytest.mark.parametrize("others", [(), ((0.02, 6.6, 0.3),), ((0.02, 2.21, 0.1),)])
