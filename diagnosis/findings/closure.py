@@ -222,10 +222,19 @@ def shares_of_gap(waterfall: Waterfall) -> dict[str, tuple[float, str]]:
     )
     least = 0.0 if by_chance is None else waterfall.without.get(str(by_chance.effect), 0.0)
     if by_chance is not None and least > 0.0:
-        last = taken[-1].excess
-        taken.remove(by_chance)
-        taken = [replace(step, excess=max(step.excess, least)) for step in taken]
-        taken.append(replace(by_chance, excess=last))
+        whole, last = taken[0].excess, taken[-1].excess
+        # without the chance differences the causes leave more, in the same proportion
+        absorbed = by_chance.excess - last
+        steps = [step for step in taken[1:] if step is not by_chance]
+        left = [(step.excess - last) / absorbed if absorbed > 0.0 else 0.0 for step in steps]
+        taken = [
+            taken[0],
+            *(
+                replace(step, excess=least + max(whole - least, 0.0) * min(max(share, 0.0), 1.0))
+                for step, share in zip(steps, left, strict=True)
+            ),
+            replace(by_chance, excess=last),
+        ]
     for before, step in pairwise(taken):
         names = str(step.effect).split(" + ")
         part = max(before.excess, 0.0) - max(step.excess, 0.0)

@@ -15,6 +15,7 @@ from diagnosis.findings.terms import (
     CHANNELS,
     CONDITIONS,
     answer_name,
+    part_of_gap,
     scattering,
     without_scatter,
 )
@@ -100,7 +101,11 @@ def _what(answer: Findings) -> str:
         part = f": {plain(*known)}, and perhaps more" if known else ""
         return f"A gap of undecided cause{part}{odd}"
     if causes == UNKNOWN:
-        return f"A gap that no known effect explains{_place(answer)}{odd}"
+        unknown = (
+            "A gap that no known effect explains" if answer.found.nearly is None else "A gap of unknown cause"
+        )
+        beside = f"{plain(*answer.surely_beside)}, and " if answer.surely_beside else ""
+        return f"{beside}{unknown if not beside else unknown[:1].lower() + unknown[1:]}{_place(answer)}{odd}"
     parts, most = shares_of_gap(answer.waterfall), _MOST_SIZED
     certain: list[str] = without_scatter(causes)
     alternatives: list[tuple[str, float]] = []
@@ -115,7 +120,8 @@ def _what(answer: Findings) -> str:
         sized.append(BETWEEN_RUNS if sized else _scatter(answer))
     words = "; and ".join(["; ".join(sized[:-1]), sized[-1]]) if len(sized) > 1 else sized[0]
     explains = "explain" if len(sized) > 1 else "explains"
-    return f"{words}{f', which {explains} only part of the gap' if answer.rest_is_material else ''}{odd}"
+    partly = f", which {explains} {part_of_gap(answer.gap.closed)}" if answer.rest_is_material else ""
+    return f"{words}{partly}{odd}"
 
 
 _MOST_SIZED = 3  # maximum number of causes named with their sizes
@@ -170,14 +176,16 @@ _NAMES = {"unknown": "an unknown cause", "none": "no gap"}
 
 def _sure(answer: Findings) -> str:
     if answer.cycling:
-        return "Every run is in a limit cycle"
+        return "Every run is a steady oscillation"
+    if answer.found.nowhere is not None and answer.found.nowhere.within_step:
+        return "The residual is not noise, but smaller than the steps of the readings"
     if not answer.causes:
         chance = percent_of(answer.gap.p_value)
         return f"Nothing beyond chance: noise alone departs as much in {chance} of campaigns"
     if not answer.decided:
         return f"Not yet: {'; '.join(_likeliest(answer))}"
     rest = (
-        "; of one run, a fault of which may be the cause"
+        "; from one run, so a fault of this run may be the cause"
         if answer.names_effects and len(answer.gap.runs) == 1
         else ""
     )
@@ -218,7 +226,7 @@ def _against(other: Candidate, first: Candidate) -> str:
 
 def _costs(answer: Findings) -> str:
     given, causes = answer.coefficients, answer.causes
-    after = {**given.after, **given.in_phase}
+    after = given.comparable
     compared = answer.names_effects
     parts = [
         f"{COEFFICIENTS.get(name, name)} {_coefficient(one, given.before.get(name) if compared else None)}"

@@ -97,13 +97,18 @@ class Remainder:
     words: str = ""
     further: str = ""
 
+    @property
+    def remains(self) -> bool:
+        """Whether a part of the gap remains: it is material, or visible in the fit whatever the coefficients do."""
+        return self.significant and (self.material or self.excess > 1.0)
+
     def in_words(self, judged: Judged) -> str:
         """The remaining gap, in sentences."""
         rest, causes = self, judged.causes
         after, named = judged.coefficients_after, judged.names_effects
         moves, excess, misfit = rest.moves, rest.excess, judged.misfit
         size = f"{misfit.rms_words(excess)} root mean square"
-        larger = excess > 1.0  # visible in the fit, whatever the move of the coefficients
+        larger = excess > 1.0
         if larger:
             size = f"{size}, {significant(math.sqrt(excess), 2)} times the noise"
         remaining = f"the residual ({size})" if named else "the gap"
@@ -220,7 +225,7 @@ def _largest(closable: Closable, ceilings: Sequence[Ceiling], gap_words: str) ->
     ]
     if closable.alike:
         sentences.append(
-            f"These runs cannot distinguish it from {' or '.join(KINDS[other] for other in closable.alike)}."
+            f"These runs cannot distinguish it from {_alternatives([KINDS[other] for other in closable.alike])}."
         )
     elif closable.next_most is not None:
         beside = [one for one in ceilings if one.held_out == best.held_out]
@@ -242,6 +247,12 @@ def _largest(closable: Closable, ceilings: Sequence[Ceiling], gap_words: str) ->
         explains = percent(law.closed, law.std)
         sentences.append(f"The formula {formula} explains {explains}{_with_values(law)}.")
     return sentences
+
+
+def _alternatives(names: Sequence[str]) -> str:
+    """Kinds of law as a list; their names contain commas."""
+    *first, last = names
+    return f"{'; '.join(first)}; or {last}" if len(first) > 1 else " or ".join(names)
 
 
 def _as_subject(kind: str) -> str:

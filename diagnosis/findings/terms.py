@@ -8,6 +8,7 @@ from diagnosis.findings.finding import Judged
 from identification.show.numbers import plain
 from tunnel_sim.effects import BetweenRuns
 from tunnel_sim.effects.registry import ALL_EFFECTS, known_effects
+from tunnel_sim.vocabulary.quantities import Share
 
 CHANNELS = {
     "stiffness": "the restoring moment",
@@ -75,7 +76,7 @@ SCATTERS = {kind.name: kind.scatters for kind in ALL_EFFECTS if issubclass(kind,
 NUMBERS = {
     "wind_speed": "the wind speed",
     "spring_stiffness": "the spring",
-    "mechanical_damping": "the damping",
+    "mechanical_damping": "the mechanical damping",
 }
 """The quantities that may differ between runs, in words."""
 
@@ -114,6 +115,14 @@ def named_answer(causes: Sequence[str]) -> str:
     if not scattering(causes):
         return plain(*proper)
     return f"{plain(*proper)}, and {BETWEEN_RUNS}" if proper else BETWEEN_RUNS.capitalize()
+
+
+def part_of_gap(closed: Share) -> str:
+    """The part of a gap that its causes explain, where a part remains."""
+    return f"{'nearly all' if closed >= _NEARLY_ALL else 'most' if closed > 0.5 else 'only part'} of the gap"
+
+
+_NEARLY_ALL = 0.95
 
 
 def answer_name(effect: str) -> str:

@@ -16,6 +16,7 @@ from diagnosis.findings.terms import (
     CHANNELS,
     CONDITIONS,
     named_answer,
+    part_of_gap,
     without_scatter,
 )
 from diagnosis.findings.whole import Findings
@@ -104,11 +105,12 @@ def _answer(answer: Findings, rest: str) -> str:
         return " ".join(filter(None, (sentence, likely, repeats, by_first)))
     if causes == UNKNOWN:
         nearly = "" if facts.nearly is None else facts.nearly.words
-        sentence = (
-            "No effect is named as its cause."
-            if nearly
-            else "No known effect explains it (tunnel effects lists them)."
+        sure = answer.surely_beside
+        beside = (
+            f"{_sentence(plain(*sure))} {'are' if len(sure) > 1 else 'is'} a part of it. " if sure else ""
         )
+        explained = f"No known effect explains {'the rest' if sure else 'it'} (tunnel effects lists them)."
+        sentence = beside + ("No effect is named as its cause." if nearly else explained)
         return " ".join(filter(None, (there_is, sentence, nearly, rest, repeats)))
     changes = {} if answer.rest_is_material else facts.immaterial
     last = (explained, rest, _immaterial(changes) or consequence(answer.coefficients, answer))
@@ -121,7 +123,7 @@ def _answer(answer: Findings, rest: str) -> str:
         subject = plain(name) if len(proper) > 1 else "the cause"
         acting.append(f"{subject} acts on {CHANNELS[kind.channel]}{wind}")
     they = "They" if len(proper) > 1 else "It"
-    part = "part of the gap" if answer.rest_is_material else "the gap"
+    part = part_of_gap(gap.closed) if answer.rest is not None and answer.rest.remains else "the gap"
     if answer.ambiguous_with:
         sentence = f"{_sentence(part)} is explained by {answer.named_causes.known_and_open(sized=False)}."
     else:

@@ -23,7 +23,7 @@ from diagnosis.findings.closure import (
     waterfall_pictures,
 )
 from diagnosis.findings.coefficients import Coefficients
-from diagnosis.findings.decision import Decision
+from diagnosis.findings.decision import IN_COMMON, Decision
 from diagnosis.findings.finding import Answered, Finding, Picture
 from diagnosis.findings.fit_view import fit_pictures
 from diagnosis.findings.friction_curve import FrictionCurve
@@ -36,6 +36,7 @@ from diagnosis.findings.other_motions import TwoModes
 from diagnosis.findings.place import place_pictures, where_pictures
 from diagnosis.findings.remainder import Remainder, law_pictures
 from diagnosis.findings.repeatability import RunRepeatability
+from diagnosis.findings.terms import without_scatter
 from diagnosis.findings.what_it_costs import WhatItCosts
 from diagnosis.model.fact import Fact, Noted
 from diagnosis.patch.written_model import PatchedModel
@@ -261,6 +262,13 @@ class Findings:
             if self.candidates[0].probability >= most
             else "most probable set of effects"
         )
+
+    @property
+    def surely_beside(self) -> list[str]:
+        """The effects that are surely present where no cause is named, such as a hum found in the records."""
+        if self.causes != UNKNOWN:
+            return []
+        return without_scatter(name for name, value in self.inclusion.items() if value >= IN_COMMON)
 
     @property
     def cycling(self) -> bool:

@@ -88,8 +88,8 @@ def test_the_head_is_the_same_in_every_face() -> None:
     ("changes", "what", "sure", "costs", "first"),
     [
         ({"causes": []}, "No gap: the model agrees", "Nothing beyond chance: noise", "Nothing: Cn", "Use"),
-        ({"causes": ["unknown"]}, "A gap that no known effect explains; it acts on the damping", "97 %", "Not corr",
-         "Examine what acts on the damping"),
+        ({"causes": ["unknown"], "inclusion": {}}, "A gap that no known effect explains; it acts on the damping",
+         "97 %", "Not corr", "Examine what acts on the damping"),
         ({"causes": ["damping_scatter"]}, "The runs differ from each other by chance", "97 %", "Cnβ 0.4", "Run"),
     ],
 )  # fmt: skip
@@ -161,6 +161,42 @@ def test_the_removal_of_a_cause_leaves_the_scatter_and_no_more() -> None:
     parts = shares_of_gap(findings_of(given).waterfall)
     assert parts[CAUSE][0] == pytest.approx(0.99)
     assert parts[names[0]][0] == pytest.approx(0.01)
+    given["waterfall"] = [
+        {"effect": None, "excess": 28.0},
+        {"effect": " + ".join(names), "excess": 6.0},
+        {"effect": CAUSE, "excess": 2.0},
+        {"effect": DRY, "excess": 0.0},
+    ]
+    given["without"] = {" + ".join(names): 16.0, CAUSE: 4.0, DRY: 2.0}
+    parts = shares_of_gap(findings_of(given).waterfall)
+    assert [parts[name][0] for name in (CAUSE, DRY, names[0])] == pytest.approx([8 / 28, 4 / 28, 16 / 28])
+
+
+def test_without_a_gap_the_steps_of_the_readings_are_no_chance() -> None:
+    given = document() | {"causes": []}
+    given["found"] |= {"place": None, "nowhere": {"runs": 1, "p_value": 1e-19, "within_step": True}}
+    assert Head.of(findings_of(given)).sure == (
+        "The residual is not noise, but smaller than the steps of the readings"
+    )
+
+
+def test_a_gap_that_an_unnamed_effect_would_explain_is_of_unknown_cause() -> None:
+    given = document() | {"causes": ["unknown"], "ambiguous_with": [], "inclusion": {}}
+    assert Head.of(findings_of(given)).what.startswith("A gap that no known effect explains; it acts on")
+    given["found"]["nearly"] = {
+        "effects": [CAUSE], "closes": 0.9, "probability": 0.3, "noisy": False, "rival": [],
+        "rival_probability": 0.0, "misfit": [],
+    }  # fmt: skip
+    assert Head.of(findings_of(given)).what.startswith("A gap of unknown cause; it acts on")
+
+
+def test_no_correction_of_a_coefficient_that_remains_uncertain_is_promised() -> None:
+    given = two_causes(causes=[DRY])
+    given["candidates"][0] |= {"effect": DRY}
+    assert "corrects Cnβ by 10 % and Cnr by 20 %" in next_steps(findings_of(given))[0]
+    given["coefficients"]["after"]["cn_r"] |= {"std": 0.1, "interval": [-0.16, -0.01]}
+    assert next_steps(findings_of(given))[0].endswith("corrects Cnβ by 10 %.")
+    assert "Cnr remains uncertain" in consequence(findings_of(given))
 
 
 @pytest.mark.parametrize(("source", "step", "left"), [
@@ -201,7 +237,9 @@ def test_the_causes_of_a_part_of_the_gap_are_said_to_explain_a_part(causes: list
     given = two_causes(causes=causes)
     given["candidates"][0] |= {"effect": " + ".join(causes)}
     given["rest"] |= {"significant": True, "material": True}
-    assert Head.of(findings_of(given)).what.endswith(f", which {explain} only part of the gap")
+    for closed, part in ((0.9876, "nearly all"), (0.6, "most"), (0.4, "only part")):
+        given["gap"] |= {"closed": closed}
+        assert Head.of(findings_of(given)).what.endswith(f", which {explain} {part} of the gap")
 
 
 def test_a_caveat_that_changes_the_answer_stands_in_the_head_and_no_other() -> None:

@@ -54,6 +54,9 @@ def test_the_runs_that_show_the_gap(given: Document) -> None:
     given["where"]["runs"] = list(IDS)
     assert placed(given, wind={}).startswith("All 3 runs show the gap. ")
     assert "with the wind" not in placed(given, wind={})
+    alike = placed(given, wind={"on": 1.01, "off": 1.0})
+    assert "; its power is as large with the wind on as with it off." in alike
+    given["found"]["place"]["wind"] = {}
     assert placed(given, runs=13).startswith("88 % of the gap is in 3 of 13 runs (alpha, beta, gamma)")
     given["where"]["runs"] = [f"r{number}" for number in range(13)]
     assert placed(given, runs=20).startswith("88 % of the gap is in 13 of 20 runs.")
@@ -255,6 +258,10 @@ def test_what_could_be_closed(given: Document) -> None:
     assert table.rows[0] == (KINDS["rate"], "31.0 ± 3.0 %", "runs")  # the kind of the sentence comes first
     assert table.title.startswith("Share of the residual gap that each kind")
     assert text(alike=["rate"]).endswith("cannot distinguish it from a moment of the rate alone.")
+    assert text(alike=["rate", "time", "reading"]).endswith(
+        "cannot distinguish it from a moment of the rate alone; a moment in time, equal in all runs; or an error "
+        "of the reading, equal in all runs."
+    )
     general = [*CEILINGS, {"kind": "state", "closed": 0.86, "std": 0.01, "held_out": "runs"}]
     assert text(ceilings=general).endswith(
         "Apart from a moment of angle and rate, which includes it, no other kind measured on runs would explain "

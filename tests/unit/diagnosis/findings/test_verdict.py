@@ -23,7 +23,7 @@ from identification.estimate import Quantity
 from tests.support.diagnosis_document import campaign, document, findings_of
 from tests.support.gap_campaigns import added, answer, nominal, studied
 from tests.support.gap_campaigns import campaign as campaign_with
-from tests.support.rendered import candidates_table, parameters_table, runs_table
+from tests.support.rendered import candidates_table, parameters_table, rest_words, runs_table
 from tunnel_lab.report.page import render_report
 from tunnel_sim.effects import effect_from, known_effects
 
@@ -54,6 +54,7 @@ def answer_of(
     return one | {
         "causes": list(causes),
         "ambiguous_with": [],
+        "inclusion": {},
         "gap": summary.to_json_dict(),
         **decided,
     }
@@ -138,11 +139,15 @@ def test_the_wind_is_mentioned_only_where_runs_have_it_on_and_off(cause):
 
 def test_what_remains_and_is_material_is_said_in_the_first_sentence():
     first = said("coulomb_friction", material=True).partition(". ")[0]
-    assert "Coulomb friction explains part of the gap" in first
-    assert "part of the gap" not in said("coulomb_friction")
+    assert "Coulomb friction explains nearly all of the gap" in first
+    assert "nearly all" not in said("coulomb_friction")
     given = document()
     given["ambiguous_with"] = []
     assert headline(findings_of(given)) == ("quadratic damping", "found")
+    assert "explains the gap (" in verdict(findings_of(given), "")
+    large = given | {"rest": given["rest"] | {"excess": 2.0}}
+    assert "explains nearly all of the gap (" in verdict(findings_of(large), "")
+    assert rest_words(findings_of(large)).startswith("Part of the gap remains: the residual")
     given["rest"]["material"] = True
     assert headline(findings_of(given)) == ("quadratic damping, in part", "open")
 
@@ -308,11 +313,20 @@ NEARLY = {
             {"misfit": ["zero", "harmonics"]},
             ", but leaves a significant misfit of the zero and the harmonics.",
         ),
+        (
+            {"effects": ["quadratic_damping", "free_play"], "misfit": ["damping", "zero", "harmonics"]},
+            ", but leave a significant misfit of the damping along the runs, the zero and the harmonics.",
+        ),
+        (
+            {"effects": ["quadratic_damping", "free_play"]},
+            " (probability 30 %), which is too little to name them.",
+        ),
     ],
 )
 def test_an_unknown_gap_says_what_would_explain_it_and_why_it_is_not_named(changes, words):
     text = said("unknown", answers=(("unknown", 0.6), ("quadratic_damping", 0.4)), nearly=NEARLY | changes)
-    assert "No effect is named as its cause. Quadratic damping would explain 99.6 % of the gap" in text
+    assert "No effect is named as its cause. Quadratic damping " in text
+    assert "would explain 99.6 % of the gap" in text
     assert words in text
     assert "No known effect explains it (tunnel effects lists them)" in said("unknown")
 
@@ -345,7 +359,17 @@ def test_second_modes_of_every_run_are_said_before_the_gap():
     mode = {"main": main, "second": second, "closes": 0.98}
     assert said("unknown", second_modes=[mode | {"run": "swing"}]).startswith("There is a gap")
     text = said("unknown", second_modes=[mode | {"run": run} for run in runs])
-    assert text.startswith(f"{runs[0]} contains a second mode")
+    assert text.startswith(f"Run {runs[0]} contains a second mode")
+
+
+def test_a_hum_in_the_records_is_a_part_of_a_gap_of_unknown_cause():
+    given = answer_of("unknown") | {
+        "inclusion": {"mains_hum": 0.99, "free_play": 0.4, "damping_scatter": 0.99}
+    }
+    text = verdict(findings_of(given), "")
+    assert "Mains hum is a part of it. No known effect explains the rest (tunnel effects lists them)." in text
+    what = Head.of(findings_of(given)).what
+    assert what.startswith("Mains hum, and a gap that no known effect explains")
 
 
 def test_runs_in_limit_cycles_have_a_verdict_of_their_own():
