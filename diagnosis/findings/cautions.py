@@ -47,9 +47,9 @@ def _few_runs(given: Figures) -> str:
 def _none_held_out(given: Figures) -> str:
     each = "spring, with the wind off and on" if given["windy"] else "run"
     return (
-        "No run could be held out of the fit, so the explained share is for the fitted runs. The "
-        f"gap as the causes are added is predicted for held-out stretches of time. Repeat every {each}: a held-out "
-        "run is a stronger test than a stretch."
+        "No run could be held out of the fit, so the gap of each run is the gap of the fit. The gap of all runs is "
+        f"predicted for held-out stretches of time. Repeat every {each}: a held-out run is a stronger test than "
+        "a stretch."
     )
 
 

@@ -151,8 +151,11 @@ def _which_runs(where: Where, place: PlaceFound) -> str:
         if wind[less] < ONE_WIND * wind[more]:
             text += f"; nearly all of it with the wind {more}"
         else:
-            ratio = wind[more] / wind[less]
-            text += f"; its power is {ratio:.2g} times as large with the wind {more}"
+            ratio = f"{wind[more] / wind[less]:.2g}"
+            alike = "as large with the wind on as with it off"
+            text += (
+                f"; its power is {alike if ratio == '1' else f'{ratio} times as large with the wind {more}'}"
+            )
     return text
 
 

@@ -268,7 +268,7 @@ class RunRepeatability:
         numbers = ("frequency [%]", "damping [%]")
         heads = ("run", *["wind"] * judged.freedom.windy, *numbers, "remark")
         last = None if any(row[-1] for row in rows) else -1
-        title = "Every run against the model"
+        title = "Every run against the model, with the deviation due to noise alone"
         if known:
             title += ", and its scatter by chance (one standard deviation)"
         return TextTable(title, heads[:last], tuple(row[:last] for row in rows), numbers)

@@ -81,7 +81,7 @@ class Traits:
     advice: ClassVar[str] = ""
     advice_for_joint: ClassVar[str] = ""
     caveat: ClassVar[str] = ""
-    undetected: ClassVar[str] = "{effect} of up to {size} is not excluded and would change {changes}"
+    undetected: ClassVar[str] = "{effect} of up to {size} cannot be excluded and would change {changes}"
 
     def __post_init__(self) -> None:
         """Refuse a parameter that is not a finite number within its bounds, or not whole where it selects cases."""

@@ -138,7 +138,7 @@ def test_the_table_and_the_sentence_state_sizes_and_moves_with_units():
     drift = {**lag, "effect": "wind_speed_drift", "size": {"value": 2e-4, "std": None, "unit": "1"}}
     both = hidden_line(findings_of(given | {"hidden": [lag, drift, {**drift, "effect": "coulomb_friction"}]}))
     assert both.endswith(
-        "Wind speed drift of up to 0.020 % is not excluded and would change Cnr by 0.0061 1/rad."
+        "Wind speed drift of up to 0.020 % cannot be excluded and would change Cnr by 0.0061 1/rad."
     )
     vortex = {**drift, "effect": "vortex_shedding", "parameter": "coefficient"}
     rows = hidden_table(findings_of(given | {"hidden": [lag, drift, vortex]})).rows

@@ -48,7 +48,7 @@ def test_causes_proper_come_first_and_the_scatter_has_a_sentence(given: Document
     )
     assert (
         "In addition the runs differ by chance: the wind speed by 0.29 % (0.13 to 0.62 %), beta −0.6 % and gamma "
-        "+0.5 % most; the damping by 1.0 % (0.62 to 1.8 %), beta −2 % and alpha +1 % most."
+        "+0.5 % most; the mechanical damping by 1.0 % (0.62 to 1.8 %), beta −2 % and alpha +1 % most."
     ) in text
     assert "the intervals of the coefficients allow for them" in text
     assert "Together with these differences it explains 98.8 % of the gap" in text
