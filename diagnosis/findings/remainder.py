@@ -16,6 +16,7 @@ from diagnosis.findings.hidden import Hidden
 from diagnosis.findings.judgements import Estimates
 from diagnosis.findings.terms import KINDS, scattering
 from diagnosis.likelihood.ceiling import INCLUDED_IN, Ceiling
+from diagnosis.model.rig import unit_per_inertia
 from diagnosis.noise.gap import gap_test
 from diagnosis.remainder.closable import Closable, Curve, Law, Line
 from diagnosis.remainder.explain import COMMON_FIRST
@@ -211,11 +212,18 @@ def closable_words(closable: Closable | None, judged: Judged) -> str:
             "noise."
         )
     of_others = _measured_otherwise(closable.kind, ceilings)
-    return " ".join([*_largest(closable, ceilings, gap_words), *of_others, *_line(closable.line)])
+    largest = _largest(closable, ceilings, gap_words, per_inertia="omega_n" in judged.coefficients_after)
+    return " ".join([*largest, *of_others, *_line(closable.line)])
 
 
-def _largest(closable: Closable, ceilings: Sequence[Ceiling], gap_words: str) -> list[str]:
-    """The share that this kind explains beyond the other kinds, its place, and its formula."""
+def _largest(
+    closable: Closable, ceilings: Sequence[Ceiling], gap_words: str, *, per_inertia: bool
+) -> list[str]:
+    """The share that this kind explains beyond the other kinds, its place, and its formula.
+
+    Args:
+        per_inertia: whether moments are per unit inertia.
+    """
     kind, where, law = closable.kind, closable.events, closable.law
     best = next(ceiling for ceiling in ceilings if ceiling.kind == kind)
     measured = "measured" if law is None else "estimated without a formula,"
@@ -245,7 +253,7 @@ def _largest(closable: Closable, ceilings: Sequence[Ceiling], gap_words: str) ->
     if law is not None:
         formula = law.effect.get("moment") or law.effect["reading"]
         explains = percent(law.closed, law.std)
-        sentences.append(f"The formula {formula} explains {explains}{_with_values(law)}.")
+        sentences.append(f"The formula {formula} explains {explains}{_with_values(law, per_inertia)}.")
     return sentences
 
 
@@ -260,14 +268,19 @@ def _as_subject(kind: str) -> str:
     return KINDS[kind].capitalize() + ("," if "," in KINDS[kind] else "")
 
 
-def _with_values(law: Law) -> str:
-    """The numbers of a formula, as a clause; empty where it has none."""
+def _with_values(law: Law, per_inertia: bool) -> str:
+    """The numbers of a formula, as a clause; empty where it has none.
+
+    Args:
+        per_inertia: whether no inertia is stated or identified, so that moments are per unit inertia.
+    """
     stated, determined, unknown = law.effect.get("parameters", {}), [], []
     for name, (value, std) in law.parameters.items():
         if not 0.0 < std < _UNKNOWN * abs(value):
             unknown.append(name)
             continue
         unit = stated.get(name, {}).get("unit", "1")
+        unit = unit_per_inertia(unit) if per_inertia else unit
         determined.append(f"{name} = {with_std(value, std)}{unit_mark(beside(unit))}")
     undetermined = f"{listed(unknown)} not determined by these runs" if unknown else ""
     return (

@@ -49,6 +49,13 @@ _PER_INERTIA = {
 }
 
 
+def unit_per_inertia(unit: str) -> str:
+    """The unit of a quantity per unit of inertia, such as rad/s2 for N m."""
+    of = dimension(unit)
+    by_mass = in_si(product(of, dimension("kg m2"), -of[0])) if of[0] else unit
+    return _PER_INERTIA.get(unit, by_mass)
+
+
 @dataclass(frozen=True)
 class SpringModel(NominalModel):
     """A body on springs of stated stiffness: Izz β̈ + C β̇ + Kr β = Ka β + Ca β̇."""
@@ -175,9 +182,7 @@ class PerInertia(SpringModel):
 
     def identified_unit(self, unit: str) -> str:
         """The unit of a quantity per unit of inertia."""
-        of = dimension(unit)
-        by_mass = in_si(product(of, dimension("kg m2"), -of[0])) if of[0] else unit
-        return _PER_INERTIA.get(unit, by_mass)
+        return unit_per_inertia(unit)
 
     def coefficient(self, names: Sequence[str], common: Array, name: str) -> float | None:
         """The natural frequency (rad/s) or the damping ratio of small swings; None for other names."""

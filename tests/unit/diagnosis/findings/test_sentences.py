@@ -282,6 +282,10 @@ def test_what_could_be_closed(given: Document) -> None:
         "The formula k*b^n explains 80.0 ± 1.0 %, with k = -0.2457 ± 0.0012 N m and n = 3.000 ± 0.020."
     )
     assert text(law=law).startswith(first.replace("(measured", "(estimated without a formula,"))
+    swing = {"omega_n": {"value": 4.5, "std": 0.01, "unit": "rad/s"}}
+    per_inertia = given | {"coefficients": {"before": swing, "after": swing}}
+    said = closable_words(findings_of(per_inertia | {"closable": CLOSABLE | {"law": law}}))
+    assert "with k = -0.2457 ± 0.0012 rad/s² and n = 3.000 ± 0.020." in said
     flat = law | {
         "parameters": values | {"d": {"value": 0.0, "std": 6e135}, "q": {"value": 0.34, "std": 0.0}}
     }
