@@ -112,8 +112,8 @@ def notes(document: Document) -> list[str]:
 Conditions = Mapping[str, tuple[float | None, float]]
 """Stiffness of the spring (N m/rad; None: not stated) and wind speed (m/s), by run id."""
 BRACKETS = (
-    "In brackets: the standard deviation in the last digits; 12.53(10) is 12.53 ± 0.10. It includes the noise "
-    "only; tunnel diagnose adds the error of the model."
+    "In brackets: the standard deviation in the last digits; 12.53(10) is 12.53 ± 0.10. It includes the noise, "
+    "and is wider where the model departs; tunnel diagnose adds the error of the model."
 )
 """Note below tables in the short notation."""
 

@@ -65,7 +65,8 @@ on     12.340(56)  0.01230(45)  ok
 <off>  –           –            no oscillation
 
 In brackets: the standard deviation in the last digits; 12.53(10) is 12.53 ± 0.10. It
-includes the noise only; tunnel diagnose adds the error of the model.
+includes the noise, and is wider where the model departs; tunnel diagnose adds the error
+of the model.
 Note: run on: it starts late; cut it
 Note: no decaying motion above the noise: check the sensor, start a free record at its
 release, or check the input of a driven one (<off>)
