@@ -207,8 +207,9 @@ def composed(
         else inclusion(named.candidates, study.beside, study.settings.gap, study.campaign.sensor.freedom),
         waterfall=closes.steps,
         rest=named.rest,
-        repeatability=repeats
-        and replace(own_repeatability(repeats, similarity), without_outlier=without_outlier),
+        repeatability=None
+        if repeats is None or cycling
+        else replace(own_repeatability(repeats, similarity), without_outlier=without_outlier),
         model=patched,
         closable=closable,
         sizes=cause_sizes(study) if study.named else (),

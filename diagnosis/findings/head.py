@@ -176,7 +176,7 @@ _NAMES = {"unknown": "an unknown cause", "none": "no gap"}
 
 def _sure(answer: Findings) -> str:
     if answer.cycling:
-        return "Every run is a steady oscillation"
+        return "Every run grows, or oscillates steadily"
     if answer.found.nowhere is not None and answer.found.nowhere.within_step:
         return "The residual is not noise, but smaller than the steps of the readings"
     if not answer.causes:

@@ -47,7 +47,9 @@ def steps(answer: Findings) -> list[NextStep]:
         return [*runs, *([use] if answer.coefficients.after else []), *_narrowing(answer)] or [_NOTHING]
     if answer.cycling:
         return runs or [
-            NextStep("Record a free decay, or the growth from rest", "a limit cycle shows no derivative")
+            NextStep(
+                "Record a free decay at a lower wind speed", "a growth or a limit cycle shows no derivative"
+            )
         ]
     if not decided:
         return [*_deciding(answer), *runs, *model_steps(answer.model, answer), _NO_REPAIR]

@@ -94,15 +94,16 @@ CASES = {
 }
 
 
-def test_runs_that_are_no_decays_have_no_trade_off_and_no_caveat_on_causes():
-    data = replace(campaign(QUADRATIC), runs=campaign(QUADRATIC).runs[-1:])
-    found = investigate(data, ())
-    chosen = Chosen(data, data, found.model, (), (), (), limit_cycles=True)
+@pytest.mark.parametrize("cycles", [True, False])
+def test_runs_that_are_no_decays_have_no_trade_off_and_no_caveat_on_causes(cycles):
+    data = campaign(QUADRATIC)
+    found = investigate(replace(data, runs=data.runs[:2]), ())
+    chosen = Chosen(found.campaign, found.campaign, found.model, (), (), (), limit_cycles=cycles)
     answer = composed(Confirmed.of(found), chosen, Question(None, (), (), lambda _: None))
-    assert answer.trade_off is None
-    assert "few runs" not in [fact.kind for fact in answer.found.cautions]
-    decays = composed(Confirmed.of(found), replace(chosen, limit_cycles=False), Question(None, (), (), print))
-    assert "few runs" in [fact.kind for fact in decays.found.cautions]
+    assert ("few runs" in [fact.kind for fact in answer.found.cautions]) is not cycles
+    assert answer.trade_off is None or not cycles
+    answer = composed(Confirmed.of(investigate(data, ())), chosen, Question(None, (), (), lambda _: None))
+    assert (answer.repeatability is None) is cycles
 
 
 @cache

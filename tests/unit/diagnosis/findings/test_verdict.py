@@ -376,6 +376,9 @@ def test_runs_in_limit_cycles_have_a_verdict_of_their_own():
     remark = {"outcome": "noted", "runs": ["r1"], "what": "it settles at 0.1 rad", "remedy": "none"}
     text = said("unknown", limit_cycles=[remark])
     assert text == "No run is a free decay, so no cause is named. r1: it settles at 0.1 rad."
+    answer = findings_of(answer_of("unknown", limit_cycles=[remark]))
+    assert Head.of(answer).sure == "Every run grows, or oscillates steadily"
+    assert next_steps(answer)[0].startswith("Record a free decay at a lower wind speed: ")
 
 
 def nearly_found(*weighed, noisy=False):
