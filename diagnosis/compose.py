@@ -233,8 +233,9 @@ def _caveats(
 ) -> tuple[Fact, ...]:
     """All caveats of an answer, in the order in which they are listed."""
     noise, data = study.prepared.noise, study.campaign
-    sought = bool(study.causes) and not chosen.limit_cycles
-    of_answer = cautions(data, noise, closes.gap.runs, closes.confirmation, named=study.named, gap=sought)
+    of_answer = cautions(
+        data, noise, closes.gap.runs, closes.confirmation, named=study.named, decays=not chosen.limit_cycles
+    )
     zeros = zeros_apart(study) if named.unsure else ()
     return (
         *chosen.left_out,

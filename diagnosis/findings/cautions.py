@@ -39,7 +39,7 @@ def _few_runs(given: Figures) -> str:
     if given["windy"]:
         others = "with other springs, wind speeds and release angles"
     number = "is one run" if given["runs"] == 1 else f"are {given['runs']} runs"
-    told = f"the form of the {motion} alone distinguishes the causes"
+    told = f"the form of the {motion} alone distinguishes causes"
     fault = " A fault of this run cannot be told from a cause." if given["runs"] == 1 else ""
     return f"There {number} only: {told}.{fault} Add runs {others}."
 

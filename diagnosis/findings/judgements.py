@@ -95,12 +95,12 @@ def cautions(
     confirmation: Confirmation,
     *,
     named: bool,
-    gap: bool = True,
+    decays: bool = True,
 ) -> tuple[Fact, ...]:
     """The caveats of an answer.
 
     Args:
-        gap: whether a cause is sought.
+        decays: whether any run is a decay, from which causes are sought.
         runs: the gap by run, and whether the run could be held out of the fit.
         confirmation: whether the fits' integrator agrees with the MuJoCo model.
         named: whether the answer names effects; only then are runs held out of a fit.
@@ -116,7 +116,7 @@ def cautions(
         beside = {"run": confirmation.run, "tolerance": INTEGRATOR_TOLERANCE}
         facts.append(Fact("not confirmed", figures | beside))
     windy = bool(campaign.in_wind)
-    if gap and len(campaign.runs) < RUNS_WITHOUT_CAUTION:
+    if decays and len(campaign.runs) < RUNS_WITHOUT_CAUTION:
         kind = {"driven": campaign.driven, "windy": windy}
         facts.append(Fact("few runs", {"runs": len(campaign.runs), **kind}))
     fitted = [run.id for run in runs if not run.held_out]

@@ -118,7 +118,11 @@ def _gain(answer: Findings, name: str, parts: dict[str, tuple[float, str]]) -> s
     return f"removes {gap}{_corrects(answer) if alone else ''}"
 
 
-_REPEATED = {"wind_speed": "wind speed", "spring_stiffness": "stiffness", "mechanical_damping": "damping"}
+_REPEATED = {
+    "wind_speed": "wind speed",
+    "spring_stiffness": "stiffness",
+    "mechanical_damping": "mechanical damping",
+}
 
 
 def _corrects(answer: Findings) -> str:

@@ -271,7 +271,7 @@ def test_a_disagreement_is_a_caution_and_agreement_is_none():
     assert cautions(data, noise, (), good, named=False) == ()
     alone = replace(data, runs=data.runs[:1])
     assert [one.kind for one in cautions(alone, noise, (), good, named=False)] == ["few runs"]
-    assert cautions(alone, noise, (), good, named=False, gap=False) == ()
+    assert cautions(alone, noise, (), good, named=False, decays=False) == ()
     (said,) = cautions(data, noise, (), bad, named=False)
     assert (said.kind, said.figures["run"]) == ("not confirmed", "r1")
     assert (said.figures["rms_rad"], said.figures["tolerance_rad"]) == pytest.approx((2e-5, 1e-5))

@@ -130,6 +130,7 @@ def test_steps_are_ordered_by_the_share_of_the_gap_and_scatter_comes_after_the_c
     assert spring.endswith("removes 60.0 % of the gap.")
     assert dry.endswith("removes 40.0 % of the gap.")
     assert bearing.startswith("Run the bearing in")
+    assert "the runs then repeat in mechanical damping" in bearing
     given["waterfall"][1:] = [{"effect": DRY, "excess": 3.0}, {"effect": SPRING, "excess": 0.0}]
     assert next_steps(findings_of(given))[0].endswith("removes 70.0 % of the gap.")
     assert not any("tunnel" in step for step in next_steps(answer))

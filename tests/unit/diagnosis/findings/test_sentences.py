@@ -147,12 +147,12 @@ def test_caveats_state_their_figures() -> None:
         return sentence_of(CAUTIONS, Fact("few runs", {"runs": runs, "driven": driven, "windy": windy}))
 
     assert few(1).endswith("Add runs with other springs and release angles.")
-    assert few(1).startswith("There is one run only: the form of the decay alone distinguishes the causes.")
+    assert few(1).startswith("There is one run only: the form of the decay alone distinguishes causes.")
     assert "A fault of this run cannot be told from a cause." in few(1)
     assert "fault" not in few(2)
     assert few(2, windy=True).endswith("springs, wind speeds and release angles.")
     assert few(2, driven=True).endswith(
-        "form of the motion alone distinguishes the causes. Add runs with other inputs."
+        "form of the motion alone distinguishes causes. Add runs with other inputs."
     )
     left_out = sentence_of(CAUTIONS, Fact("another mode", {"ratio": 1.5, "runs": ["r1", "r3"]}))
     assert "at least 1.5 times as fast as the same spring with the wind off: r1, r3." in left_out
