@@ -408,13 +408,15 @@ def _settled(
     exchanges = set[tuple[str, str]]()
 
     with suppress(FitError, np.linalg.LinAlgError):
-        for _ in range(_ROUNDS):
+        for number in range(_ROUNDS):
             process = likeliest(random_moments(known, source), chosen)
             noisy = None if process is None else with_response(known, process.spectrum)
             if noisy is None:
                 break
             base = with_likeliest_widths(fit(replace(nominal.problem, data=noisy), nominal.point))
-            sets = [Hypothesis((), base), *_in_noise_of(base, best), *grow(view.on(base))]
+            sets = [Hypothesis((), base), *_in_noise_of(base, best)]
+            if number == 0:  # later rounds only drop effects and add evident ones
+                sets += grow(view.on(base))
             found = max(sets, key=Scale.of(sets, gap_left(base), base.settings.weighing).weight)
             # a random moment leaves little of a gap for comparing effects where it acts: more are added while one
             # seen there alone is evident, the most evident of all, so that none absorbs the residual of another
