@@ -40,7 +40,13 @@ class Combination:
 
     @classmethod
     def of(
-        cls, quantity: str, values: Array, covariance: Array, bounds: Array, unit: str
+        cls,
+        quantity: str,
+        values: Array,
+        covariance: Array,
+        bounds: Array,
+        unit: str,
+        further_std: Callable[[Array], float] = lambda _: 0.0,
     ) -> Combination | None:
         """The combination of least variance.
 
@@ -48,6 +54,8 @@ class Combination:
             values: of both parameters, shape (2,), the first in the unit.
             covariance: covariance of both, shape (2, 2).
             bounds: least and greatest value of each, shape (2, 2).
+            further_std: standard deviation of a combination by other sources than noise, in the unit, from the
+                factors on both, shape (2,).
 
         Returns:
             None if the parameters do not add up: a larger one then needs a larger other.
@@ -56,8 +64,10 @@ class Combination:
         if not factor > 0.0:
             return None
         whole = float(values[0] + factor * values[1])
-        std = math.sqrt(max(float(covariance[0, 0] + factor * covariance[0, 1]), 0.0))
-        own, reach = float(values[1]), INTERVAL * math.sqrt(float(covariance[1, 1]))
+        by_noise = math.sqrt(max(float(covariance[0, 0] + factor * covariance[0, 1]), 0.0))
+        std = math.hypot(by_noise, further_std(np.array([1.0, factor])))
+        std_of_second = math.hypot(math.sqrt(float(covariance[1, 1])), further_std(np.array([0.0, 1.0])))
+        own, reach = float(values[1]), INTERVAL * std_of_second
         low = max(own - reach, bounds[1, 0], (whole - bounds[0, 1]) / factor)
         high = min(own + reach, bounds[1, 1], (whole - bounds[0, 0]) / factor)
         ends = (

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from diagnosis.answer.linear_theory import move_of_halves
 from diagnosis.findings.units import own_estimate, own_parameters
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import linear_coefficients
@@ -16,6 +17,7 @@ from tunnel_sim.effects import Effect
 from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.dimensions import angle_power, dimension
+from tunnel_sim.vocabulary.record import Array
 
 
 def least_separated(fit: Fit, campaign: Campaign) -> TradeOff | None:
@@ -40,7 +42,8 @@ def least_separated(fit: Fit, campaign: Campaign) -> TradeOff | None:
 def _together(fit: Fit, campaign: Campaign, pair: tuple[str, str]) -> Combination | None:
     """The combination of two parameters that a fit determines, in the units of the measured campaign.
 
-    The mechanical damping of a body on a spring is stated as a damping ratio.
+    The mechanical damping of a body on a spring is stated as a damping ratio. The difference between halves of the
+    data, beyond chance, counts as an error of the model.
     """
     problem, data = fit.problem, fit.problem.data
     places = [problem.names.index(name) for name in pair]
@@ -53,12 +56,19 @@ def _together(fit: Fit, campaign: Campaign, pair: tuple[str, str]) -> Combinatio
     if pair[0] == "mechanical_damping" and critical is not None:
         quantity, unit, scale[0] = "zeta", "1", 1.0 / critical
     bounds = np.array([[end[place] for end in problem.bounds] for place in places])
+
+    def of_halves(factors: Array) -> float:
+        gradient = np.zeros(len(problem.names))
+        gradient[places] = factors * scale
+        return move_of_halves(fit, gradient)
+
     return Combination.of(
         quantity,
         scale * fit.point.common[places],
         inflated * np.outer(scale, scale),
         bounds * scale[:, None],
         unit,
+        of_halves,
     )
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from diagnosis.answer.held_out import one_more
+from diagnosis.answer.linear_theory import move_of_halves
 from diagnosis.findings.trade_off import least_separated, role_in_effect
 from diagnosis.likelihood.residuals import linear_coefficients
 from identification import identify
@@ -162,6 +163,17 @@ def test_the_combination_of_least_variance_is_stated_and_the_split_respects_the_
     assert Combination.of("a", values, np.abs(matrix), np.zeros((2, 2)), "1") is None  # they do not add up
 
 
+def test_an_error_of_the_model_widens_the_combination_and_the_part_of_the_second():
+    values, matrix = np.array([0.003, 0.0062]), np.array([[1.0, -1.9], [-1.9, 4.0]]) * 1e-8
+    bounds = np.array([[0.0, 1.0], [0.0, 1.0]])
+    by_noise = Combination.of("zeta", values, matrix, bounds, "1")
+    given = Combination.of("zeta", values, matrix, bounds, "1", lambda factors: 3e-4 * float(np.sum(factors)))
+    assert given.value == by_noise.value
+    assert given.std == pytest.approx(np.hypot(by_noise.std, 3e-4 * (1.0 + given.factor)))
+    reach = 1.96 * given.factor * np.hypot(2e-4, 3e-4)
+    assert given.of_second == pytest.approx(given.factor * values[1] + np.array([-reach, reach]), rel=1e-3)
+
+
 def test_a_fit_states_the_combination_of_two_losses_as_a_damping_ratio():
     data = gap_campaign(effect_from("quadratic_damping", {"coefficient": 0.003}))
     base = nominal(data)
@@ -176,3 +188,13 @@ def test_a_fit_states_the_combination_of_two_losses_as_a_damping_ratio():
     matrix = whole.covariance[np.ix_(places, places)]
     assert together.std < 0.5 * 0.5 * np.sqrt(matrix[0, 0] / (inertia * stiffness))
     assert 0.0 <= together.of_second[0] < together.of_second[1] <= together.value
+
+
+def test_the_combination_includes_the_difference_between_halves_of_the_data():
+    data = gap_campaign(effect_from("quadratic_damping", {"coefficient": 0.003, "exponent": 1.3}))
+    whole = one_more(nominal(data), effect_class("quadratic_damping"))
+    together = least_separated(whole, data).together
+    place = whole.problem.names.index("quadratic_damping.coefficient")
+    moved = move_of_halves(whole, np.eye(len(whole.problem.names))[place])
+    assert moved > 3.0 * whole.std("quadratic_damping.coefficient")
+    assert together.of_second[1] - together.of_second[0] > 1.9 * together.factor * moved
