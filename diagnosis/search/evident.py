@@ -21,6 +21,10 @@ EVIDENT_FROM: Final = 20.0
 """Minimum drop of χ² for a further effect beside a random moment to be evident. Judgement. Two parameters
 lower χ² by more than 20 by chance once in 22,000 effects tried."""
 
+SHOWN_WITHIN: Final = 1000.0
+"""Ratio of the standard deviation of an effect's size without a run to the one with it, above which the other runs
+do not show the effect. Judgement. Of few runs, all but one may determine it by rounding alone."""
+
 _DETERMINED = 1e-12  # minimum eigenvalue of a determined direction, as a share of the greatest
 
 
@@ -76,7 +80,7 @@ def overdispersion(fitted: Fit, kind: type[Effect]) -> float:
     """Factor by which the variance of an effect's parameters exceeds its value in independent noise, 1 or more.
 
     An effect that one run shows almost alone may be an odd run; the variance is then mostly the disagreement of the
-    other runs. Where no other run shows it at all, none disagrees, and the factor says nothing.
+    other runs. Where the other runs hardly show it, none disagrees, and the factor says nothing.
 
     Returns:
         The mean over the parameters, from the changes of the estimate as each run is left out, by linear theory
@@ -89,6 +93,8 @@ def overdispersion(fitted: Fit, kind: type[Effect]) -> float:
     by_size, count = np.outer(size, size), len(gradients)
     inverse = np.linalg.pinv(total / by_size, rcond=_DETERMINED, hermitian=True)
     without = np.linalg.pinv((total - matrices) / by_size, rcond=_DETERMINED, hermitian=True)
-    changes = np.einsum("rij,rj->ri", without, gradients / size)[:, own]
+    precision = np.linalg.pinv(inverse[np.ix_(own, own)])
+    wider = np.einsum("ij,rji->r", precision, without[:, own][:, :, own]) / max(len(own), 1)
+    changes = np.einsum("rij,rj->ri", without, gradients / size)[wider < SHOWN_WITHIN**2][:, own]
     robust = changes.T @ changes * (count - 1) / count
-    return max(1.0, float(np.trace(np.linalg.pinv(inverse[np.ix_(own, own)]) @ robust)) / max(len(own), 1))
+    return max(1.0, float(np.trace(precision @ robust)) / max(len(own), 1))

@@ -70,6 +70,26 @@ def test_an_effect_that_one_run_alone_shows_has_the_disagreement_of_the_others(f
     assert found * variance == pytest.approx(away**2, rel=0.2)
 
 
+@pytest.mark.parametrize(("share", "contradicts"), [(1e-2, True), (1e-4, False)])
+def test_runs_that_hardly_show_an_effect_do_not_contradict_the_one_that_does(fitted, share, contradicts):
+    """Truth: columns without correlation, a share of the first run's sensitivity in the others, ten along them.
+
+    Of few runs, the others then determine the effect by rounding alone.
+    """
+    rng = np.random.default_rng(13)
+    place, runs = fitted.problem.names.index("quadratic_damping.coefficient"), fitted.problem.data.runs[:4]
+    jacobian, residuals = [], []
+    for index, (common, release) in enumerate(fitted.jacobian[: len(runs)]):
+        columns = rng.normal(size=common.shape)
+        residuals.append((10.0 if index else 0.0) * columns[:, place] / np.linalg.norm(columns[:, place]))
+        columns[:, place] *= share if index else 1.0
+        jacobian.append((columns, rng.normal(size=release.shape)))
+    problem = replace(fitted.problem, data=fitted.problem.data.with_runs(runs))
+    few = replace(fitted, problem=problem, jacobian=jacobian)
+    found = overdispersion(replace(few, residuals=project_out(few, residuals)), KIND)
+    assert (found > 100.0) == contradicts
+
+
 @pytest.mark.parametrize(
     ("along", "rate", "follows"), [(3.0, 3.0, False), (100.0, 1.0, True), (1.0, 100.0, True)]
 )
