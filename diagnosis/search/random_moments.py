@@ -443,7 +443,7 @@ def _settled(
             exchanges |= _exchanges([found, *sets])
             top = needed(replace(found, fit=sought_again(found.fit)))
             further = evident(top, kinds)
-            while any(h.effects[-1] in hidden for h in further):
+            while any(number > 0 or h.effects[-1] in hidden for h in further):
                 top, exchanges = further[0], exchanges | _exchanges(further)
                 further = evident(top, kinds)
             if top.names == best.names:
