@@ -11,7 +11,7 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import project_out, starting_points
 from diagnosis.model.parameters import Point
 from diagnosis.search.evident import overdispersion
-from diagnosis.search.random_moments import follows_the_motion, is_self_made
+from diagnosis.search.random_moments import follows_the_motion, is_inflated
 from tests.support.gap_campaigns import CONDITIONS, campaign, nominal
 from tunnel_sim.effects import effect_class, effect_from
 
@@ -91,8 +91,8 @@ def test_runs_that_hardly_show_an_effect_do_not_contradict_the_one_that_does(fit
     assert (found > 100.0) == contradicts
 
 
-@pytest.mark.parametrize(("excess", "self_made"), [(2.0, False), (8.0, True)])
-def test_a_noise_that_permits_a_large_error_of_the_model_is_no_moment(fitted, excess, self_made):
+@pytest.mark.parametrize(("excess", "inflated"), [(2.0, False), (8.0, True)])
+def test_a_noise_that_permits_a_large_error_of_the_model_is_no_moment(fitted, excess, inflated):
     """Truth: a point whose χ² exceeds the least by a multiple of the number of readings."""
     place, common = fitted.problem.names.index("quadratic_damping.coefficient"), fitted.point.common
     away = np.eye(common.size)[place] * 0.1 * common[place]
@@ -100,7 +100,7 @@ def test_a_noise_that_permits_a_large_error_of_the_model_is_no_moment(fitted, ex
     far = away * np.sqrt(excess * fitted.count / (near.total - fitted.total))
     beside = fit_at(fitted.problem, Point(common + far, fitted.point.per_run))
     assert (beside.total - fitted.total) / fitted.count == pytest.approx(excess, rel=0.2)
-    assert is_self_made(beside) == self_made
+    assert is_inflated(beside) == inflated
 
 
 @pytest.mark.parametrize(
