@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from diagnosis.findings.terms import CHANNELS, among_answers, without_scatter
 from diagnosis.settings import AnswerSettings
-from identification.show.numbers import listed, plain, probability, share
+from identification.show.numbers import alternatives, listed, plain, probability, share
 from tunnel_sim.effects import BetweenRuns, known_effects
 from tunnel_sim.files.from_json import from_json_fields
 from tunnel_sim.files.writing import as_json
@@ -160,9 +160,7 @@ class Decision:
         answers = [f"{among_answers(effect)} ({probability(value)})" for effect, value in shown]
         if more := len(self.credible) - len(shown):
             answers.append(f"{more} more")
-        if len(answers) <= 2:
-            return " or ".join(answers)
-        return f"{'; '.join(answers[:-1])}; or {answers[-1]}"  # an answer is itself a list
+        return alternatives(answers)
 
     def to_json_dict(self) -> dict[str, Any]:
         """The fields ``decided``, ``unpredictive``, ``doubts``, ``credible`` and ``common`` of a document."""

@@ -26,6 +26,7 @@ from identification.printing import COEFFICIENTS
 from identification.show.blocks import TextTable
 from identification.show.drawing import AFTER, BEFORE, NARROW, colour_bar, faded
 from identification.show.numbers import (
+    alternatives,
     change_up_to,
     joined_mark,
     listed,
@@ -233,7 +234,7 @@ def _largest(
     ]
     if closable.alike:
         sentences.append(
-            f"These runs cannot distinguish it from {_alternatives([KINDS[other] for other in closable.alike])}."
+            f"These runs cannot distinguish it from {alternatives([KINDS[other] for other in closable.alike])}."
         )
     elif closable.next_most is not None:
         beside = [one for one in ceilings if one.held_out == best.held_out]
@@ -255,12 +256,6 @@ def _largest(
         explains = percent(law.closed, law.std)
         sentences.append(f"The formula {formula} explains {explains}{_with_values(law, per_inertia)}.")
     return sentences
-
-
-def _alternatives(names: Sequence[str]) -> str:
-    """Kinds of law as a list; their names contain commas."""
-    *first, last = names
-    return f"{'; '.join(first)}; or {last}" if len(first) > 1 else " or ".join(names)
 
 
 def _as_subject(kind: str) -> str:

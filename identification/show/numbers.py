@@ -381,6 +381,12 @@ def listed(parts: Sequence[str]) -> str:
     return f"{', '.join(first)} and {last}" if first else last
 
 
+def alternatives(parts: Sequence[str]) -> str:
+    """Parts that may contain commas as a choice: ``one or two``; ``one; two; or three``."""
+    *first, last = parts
+    return f"{'; '.join(first)}; or {last}" if len(first) > 1 else " or ".join(parts)
+
+
 def percent_of(value: Share, digits: int = 2, *, sign: bool = False) -> str:
     """A fraction in per cent, such as ``0.29 %`` or ``−0.6 %``.
 
