@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from diagnosis.findings.finding import Judged, Picture
 from diagnosis.findings.hidden import Hidden
@@ -270,7 +270,7 @@ def consequence(given: Coefficients, judged: Judged) -> str:
         if after is None or not before.value or not (before.determined and after.determined):
             continue
         label = COEFFICIENTS.get(name, name)
-        if after.std is not None and after.std > OPEN * abs(after.value):
+        if after.std is not None and after.std > UNCERTAIN_FROM * abs(after.value):
             clauses.append(
                 f"{label} remains uncertain ({for_people(after.value, after.std, unit_mark(after.unit))})"
             )
@@ -302,7 +302,9 @@ def _of_the_rate(given: Coefficients) -> str:
     )
 
 
-OPEN = 0.5  # standard deviation, as a share of the value, above which its change is meaningless
+UNCERTAIN_FROM: Final = 0.5
+"""Standard deviation of a coefficient, as a share of its value, above which its change is not stated.
+Convention."""
 
 
 def _apart(before: float, after: float) -> str:

@@ -32,6 +32,12 @@ from tunnel_sim.vocabulary.record import Array
 SEPARATED_BY: Final = 3.0
 """Minimum difference between two answers for a run to distinguish them, in standard deviations. Convention.
 Odds of about 100:1."""
+ANOTHER_RUN: Final = 0.2
+"""Relative difference of a wind speed or a release angle above which a planned run differs from a run that is made.
+Judgement."""
+WHOLE_RUN: Final = 0.3
+"""Duration of a run that is made, as a share of the planned one, below which the planned run is another.
+Judgement."""
 
 _ANGLES = (1.0, 0.4)  # shares of the largest swing of the runs
 _DURATIONS = (10.0, 30.0)  # s
@@ -289,15 +295,11 @@ def _made(fit: Fit, planned: RunData, angle: float) -> bool:
     """Whether a run of the same spring, wind speed and release angle exists, and is not much shorter."""
     return any(
         run.spring_stiffness == planned.spring_stiffness
-        and abs(run.wind_speed - planned.wind_speed) <= _ALIKE * planned.wind_speed
-        and abs(abs(own[0]) - angle) <= _ALIKE * angle
-        and run.duration >= _SHORT * planned.duration
+        and abs(run.wind_speed - planned.wind_speed) <= ANOTHER_RUN * planned.wind_speed
+        and abs(abs(own[0]) - angle) <= ANOTHER_RUN * angle
+        and run.duration >= WHOLE_RUN * planned.duration
         for run, own in zip(fit.problem.data.runs, fit.point.per_run, strict=True)
     )
-
-
-_ALIKE = 0.2  # relative difference of a wind speed or an angle that makes no other run
-_SHORT = 0.3  # share of a duration
 
 
 def separation(first: Fit, second: Fit, run: RunData, angle: float) -> float | None:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from diagnosis.findings.closure import shares_of_gap
-from diagnosis.findings.coefficients import OPEN
+from diagnosis.findings.coefficients import UNCERTAIN_FROM
 from diagnosis.findings.disturbed_runs import disturbed_step
 from diagnosis.findings.finding import NextStep
 from diagnosis.findings.input_hold import hold_steps
@@ -132,7 +132,7 @@ def _corrects(answer: Findings) -> str:
         two = given.comparable.get(name)
         if two is None or not (one.determined and two.determined) or one.value * two.value <= 0.0:
             continue
-        if two.std is not None and two.std > OPEN * abs(two.value):
+        if two.std is not None and two.std > UNCERTAIN_FROM * abs(two.value):
             continue
         change = abs(relative_change(one.value, two.value))
         if _VISIBLE <= change < 1.0 and not two.agrees(one.value):
