@@ -8,6 +8,8 @@ from diagnosis.answer.held_out import excess_base
 from diagnosis.findings.candidates import Candidate, candidates
 from diagnosis.findings.causes import NamedCauses
 from diagnosis.search.scatter import scattered as beside_scatter
+from identification.estimate import Quantity
+from tests.support.diagnosis_document import document, findings_of
 from tests.support.gap_campaigns import answer, campaign, nominal, studied
 from tests.support.scattered_runs import SCATTERED, scattered
 from tunnel_sim.effects import effect_class, effect_from
@@ -50,3 +52,17 @@ def test_scatter_of_a_rival_alone_is_part_of_the_alternative():
         [],
         [("spring miscalibration", 0.6), ("gravity stiffness and scatter between runs", 0.35)],
     )
+
+
+def test_effects_say_their_sizes_as_a_person_would():
+    def size(effect, parameter, given, asked=""):
+        one = Candidate(effect, 0.9, 0.0, 0.0, {parameter: given})
+        return findings_of(document()).named_causes.said_size(one, asked or effect)
+
+    friction = Quantity(0.0039991, 4.1e-6, "N m")
+    assert size("coulomb_friction", "friction_moment", friction) == "dry friction of 0.00400 N m"
+    play = Quantity(0.0123, 0.0012, "rad")
+    assert (
+        size("free_play", "half_width", play) == "play of 0.705 ± 0.069° to each side between spring and rod"
+    )
+    assert size("free_play", "half_width", play, "cubic_stiffness") == ""

@@ -8,10 +8,9 @@ from typing import Any
 import pytest
 
 from diagnosis.answer.held_out import ON_RUNS, Step, Waterfall
-from diagnosis.findings.candidates import Candidate
 from diagnosis.findings.closing import held_out_totals
 from diagnosis.findings.closure import FITTED, GapSummary, RunGap
-from diagnosis.findings.decision import Predictions, decision
+from diagnosis.findings.decision import decision
 from diagnosis.findings.head import Head
 from diagnosis.findings.judgements import Nearly, immaterial, nearly
 from diagnosis.findings.misfit import Misfit
@@ -198,53 +197,6 @@ def test_where_no_effect_is_common_the_channel_may_be():
     )
     assert "The likely answers" not in apart
     assert "The answer is one of these" in apart
-
-
-def test_the_credible_set_is_the_smallest_with_nine_tenths():
-    assert [name for name, _ in decision(UNDECIDED, Settings().answer).credible] == [
-        name for name, _ in UNDECIDED[:3]
-    ]
-    assert decision((("none", 0.999), ("unknown", 0.001)), Settings().answer).credible == (("none", 0.999),)
-
-
-@pytest.mark.parametrize(
-    ("predictions", "doubt"),
-    [
-        (Predictions(held_out=0.0), "explains nothing of the gap on held-out readings"),
-        (Predictions(held_out=0.09), "explains only 9.0 % of the gap on held-out readings"),
-        (Predictions(held_out=0.98, ahead=0.0), "explains nothing of the gap in the later half of the runs"),
-        (
-            Predictions(held_out=0.98, patched=0.02),
-            "explains only 2.0 % of the gap when written into the model",
-        ),
-        (
-            Predictions(held_out=0.98, under_load=0.02),
-            "leaves 2.0 % of the gap: friction under load may follow another law",
-        ),
-        (Predictions(held_out=0.98, left=0.16), "leaves a residual of 16.0 % of the swing on held-out"),
-        (Predictions(held_out=0.2, ahead=0.2, patched=0.2, left=0.09), ""),
-        (Predictions(), ""),
-    ],
-)
-def test_an_answer_that_predicts_nothing_is_undecided(predictions, doubt):
-    answers = (("free_play", 0.61), ("coulomb_friction", 0.35), ("unknown", 0.04))
-    found = decision(answers, Settings().answer, predictions)
-    assert found.decided is not bool(doubt)
-    assert bool(found.unpredictive) is bool(doubt)
-    assert [name for name, _ in found.credible] == ["free_play", "coulomb_friction"]
-    words = found.words("the runs")
-    assert ("Free play fits best, but" in words) is bool(doubt)
-    assert doubt in words
-    assert decision((("unknown", 0.9), ("free_play", 0.1)), Settings().answer, predictions).decided
-
-
-def test_the_verbs_of_a_doubt_agree_with_the_number_of_causes():
-    answers = (("coulomb_friction + gravity_stiffness", 0.71), ("unknown", 0.29))
-    words = decision(answers, Settings().answer, Predictions(held_out=0.05, left=0.22)).words("the runs")
-    assert words.partition(". The answer")[0].endswith(
-        "fit best, but explain only 5.0 % of the gap on held-out readings and leave a residual of 22.0 % of the "
-        "swing on held-out readings"
-    )
 
 
 def test_an_undecided_answer_is_undecided_on_every_page():
@@ -470,20 +422,6 @@ def test_what_the_causes_change_is_said_in_per_cent():
     assert words in verdict(findings_of(one), "")
     one["found"]["immaterial"] = {"cn_beta": 0.001}
     assert "Cnβ falls by" not in verdict(findings_of(one), "")
-
-
-def test_effects_say_their_sizes_as_a_person_would():
-    def size(effect, parameter, given, asked=""):
-        one = Candidate(effect, 0.9, 0.0, 0.0, {parameter: given})
-        return findings_of(document()).named_causes.said_size(one, asked or effect)
-
-    friction = Quantity(0.0039991, 4.1e-6, "N m")
-    assert size("coulomb_friction", "friction_moment", friction) == "dry friction of 0.00400 N m"
-    play = Quantity(0.0123, 0.0012, "rad")
-    assert (
-        size("free_play", "half_width", play) == "play of 0.705 ± 0.069° to each side between spring and rod"
-    )
-    assert size("free_play", "half_width", play, "cubic_stiffness") == ""
 
 
 def of_model(armature: float, *free: str, std: float | None = 2e-4) -> dict[str, Any]:

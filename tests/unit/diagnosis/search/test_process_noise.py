@@ -318,12 +318,7 @@ DRIFT = effect_from("sensor_drift", {"drift": 0.01})
 SPRING = effect_from("cubic_stiffness", {"coefficient": 0.1})
 
 
-@pytest.fixture(scope="module")
-def drifting():
-    return nominal(buffeted(campaign(DRIFT, SPRING), 0.003, 3.0))
-
-
-def test_an_effect_that_growth_misses_in_the_first_noise_is_added_in_the_next(monkeypatch, drifting):
+def test_an_effect_that_growth_misses_in_the_first_noise_is_added_in_the_next(monkeypatch):
     """Growth finds the drift alone; the spring acts beside it, and both beside turbulence."""
 
     def grown(view):
@@ -331,7 +326,7 @@ def test_an_effect_that_growth_misses_in_the_first_noise_is_added_in_the_next(mo
         return [Hypothesis((DRIFT.name,), fit(point.problem, point.point))]
 
     monkeypatch.setattr(random_moments, "grow", grown)
-    kinds = (*BUFFETING, type(SPRING))
+    kinds, drifting = (*BUFFETING, type(SPRING)), nominal(buffeted(campaign(DRIFT, SPRING), 0.003, 3.0))
     (answer,) = weigh_random_moments(whole_runs(drifting, kinds), [])
     assert answer.names == ("buffeting", "cubic_stiffness", "sensor_drift")
 
