@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import make_lsq_spline
 from scipy.special import gammaincinv, ndtri
 
@@ -175,9 +176,9 @@ def driven_variance(reading: Array, values: Array, low: float) -> tuple[float, f
 def campaign_noise(campaign: Campaign, chosen: NoiseSettings) -> Noise:
     """The noise of every run: as stated where the records agree with it, else as estimated from them.
 
-    The stated noise is used where the runs agree with one another and their mean agrees with it, both within
-    chance; else the estimate, pooled over runs where they agree. Where a run contains less noise than the accuracy
-    of the fits, that accuracy is used instead.
+    Most runs usually agree with one another within chance. They have the stated noise if their mean agrees with it,
+    else that mean; a run that differs from them has its own. Where a run contains less noise than the accuracy of
+    the fits, that accuracy is used instead.
     """
     measured, relative = _measured(campaign)
     # however slow the motion, a rounded reading has at least this error
@@ -185,29 +186,46 @@ def campaign_noise(campaign: Campaign, chosen: NoiseSettings) -> Noise:
     estimates = {run: max(value, rounded) for run, value in measured.items()}
     variances = np.array(list(estimates.values()))
     pooled, uncertainty = float(np.mean(variances)), float(np.sqrt(np.sum(relative**2)) / relative.size)
-    stated = _stated_variance(campaign.sensor, pooled)
+    alike = _alike(variances, relative, chosen.own_rate)
+    uniform, some = bool(alike.all()), alike if alike.any() else np.ones_like(alike)
+    common, chance = float(np.mean(variances[some])), float(np.sqrt(np.sum(relative[some] ** 2))) / some.sum()
+    agrees = -float(ndtri(0.5 * chosen.stated_rate)) * chance
+    stated = _stated_variance(campaign.sensor, common, agrees)
     floors = {run.id: accuracy(run.record, swings=not run.unrestrained) ** 2 for run in campaign.runs}
     fewer = sum(floors[run] > value for run, value in estimates.items())
     if fewer:
         used = {run: max(value, floors[run]) for run, value in estimates.items()}
         reason = Fact("floor", {"std_rad": float(np.sqrt(pooled)), "fewer": fewer, "runs": len(used)})
         return Floor(used, stated, reason, pooled, 0.0, measured)
-    apart = -float(ndtri(0.5 * chosen.own_rate / variances.size))
-    agrees = -float(ndtri(0.5 * chosen.stated_rate))
-    uniform = bool(np.all(np.abs(variances / pooled - 1.0) < apart * relative))
-    used = dict.fromkeys(estimates, pooled) if uniform else estimates
+    agreed = stated is not None and abs(common / stated - 1.0) < agrees
+    common = stated if stated is not None and agreed else common
+    used = {run: common if same else estimates[run] for run, same in zip(estimates, alike, strict=True)}
     std = float(np.sqrt(pooled))
     level = {"std_rad": std, "uncertainty_rad": 0.5 * uncertainty * std}
     if stated is None:
         reason = Fact("not stated")
-    elif uniform and abs(pooled / stated - 1.0) < agrees * uncertainty:
-        used = dict.fromkeys(estimates, stated)
+    elif uniform and agreed:
         return StatedNoise(used, stated, Fact("agrees", level), pooled, uncertainty, measured)
     else:
         span = {"least_rad": float(np.sqrt(variances.min())), "most_rad": float(np.sqrt(variances.max()))}
         beside = {"stated_rad": float(np.sqrt(stated))}
         reason = Fact("contradicts", beside | level) if uniform else Fact("differs by run", beside | span)
     return Estimated(used, stated, reason, pooled, uncertainty, measured)
+
+
+def _alike(variances: Array, relative: Array, rate: float) -> NDArray[np.bool_]:
+    """Whether the noise of each run agrees with the noise of most runs, shape (runs,); all False without a majority.
+
+    Args:
+        variances: shape (runs,), rad².
+        relative: their relative standard deviations, shape (runs,).
+        rate: of false alarms of all runs together.
+    """
+    apart = -float(ndtri(0.5 * rate / variances.size)) * relative
+    alike = np.abs(variances / np.mean(variances) - 1.0) < apart
+    if not alike.all():  # the median is not moved by a run that differs
+        alike = np.abs(variances / np.median(variances) - 1.0) < apart
+    return alike if 2 * alike.sum() > alike.size else np.zeros_like(alike)
 
 
 def _measured(campaign: Campaign) -> tuple[dict[str, float], Array]:
@@ -223,12 +241,22 @@ def _measured(campaign: Campaign) -> tuple[dict[str, float], Array]:
     return {run: value for run, (value, _) in found.items()}, np.array([std for _, std in found.values()])
 
 
-def _stated_variance(sensor: SensorProperties, seen: float) -> float | None:
-    """The variance stated by a data sheet, before or after rounding, rad²: the one closer to the observed one."""
+def _stated_variance(sensor: SensorProperties, measured: float, agrees: float) -> float | None:
+    """The variance stated by a data sheet, before or after rounding, rad²; None where none is stated.
+
+    A data sheet seldom says which. The larger one is taken where the records agree with it, since noise that is
+    taken too small is a gap; else the one closer to the records.
+
+    Args:
+        measured: variance of the records, rad².
+        agrees: greatest relative difference by chance.
+    """
     if not sensor.noise_std:  # no record has a noise of zero
         return None
-    before = sensor.noise_std**2 + (sensor.resolution or 0.0) ** 2 / 12.0
-    return min((before, sensor.noise_std**2), key=lambda variance: abs(variance - seen))
+    rounded = sensor.noise_std**2 + (sensor.resolution or 0.0) ** 2 / 12.0
+    if abs(measured / rounded - 1.0) < agrees:
+        return rounded
+    return min((rounded, sensor.noise_std**2), key=lambda variance: abs(variance - measured))
 
 
 def _fastest(run: Run) -> float:

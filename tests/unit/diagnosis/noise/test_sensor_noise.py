@@ -142,17 +142,40 @@ def test_noise_of_a_sensor_is_far_above_the_floor():
     assert fast > 2.0 * slow
 
 
-def test_runs_of_equal_noise_share_its_estimate_and_others_keep_their_own():
-    quiet = decays()
-    assert len(set(campaign_noise(quiet, Settings().noise).variance.values())) == 1
-    rng = np.random.default_rng(8)
-    runs = list(quiet.runs)
-    record = runs[2].record
-    louder = record.yaw_rad + rng.normal(0.0, 3.0 * NOISE, record.yaw_rad.size)
-    runs[2] = replace(runs[2], record=Record(record.time_s, louder))
-    variance = campaign_noise(replace(quiet, runs=tuple(runs)), Settings().noise).variance
-    assert variance[runs[2].id] == pytest.approx(10.0 * NOISE**2, rel=0.3)
-    assert variance[runs[0].id] == pytest.approx(NOISE**2, rel=0.3)
+def rescaled(data, place, factor):
+    """The campaign with the noise of one run multiplied by a factor."""
+    runs = list(data.runs)
+    time, quiet = runs[place].record.time_s, decays(noise=0.0).runs[place].record.yaw_rad
+    reading = quiet + factor * (runs[place].record.yaw_rad - quiet)
+    runs[place] = replace(runs[place], record=Record(time, reading))
+    return replace(data, runs=tuple(runs))
+
+
+@pytest.mark.parametrize("stated", [NOISE, None])
+@pytest.mark.parametrize("factor", [0.3, 3.0])
+def test_a_run_that_differs_has_its_own_noise_and_the_others_share_theirs(stated, factor):
+    data = decays(stated_noise=stated)
+    assert len(set(campaign_noise(data, Settings().noise).variance.values())) == 1
+    variance = campaign_noise(rescaled(data, 2, factor), Settings().noise).variance
+    assert variance.pop(data.runs[2].id) == pytest.approx((factor * NOISE) ** 2, rel=0.3)
+    (common,) = set(variance.values())
+    assert common == (stated**2 if stated else pytest.approx(NOISE**2, rel=0.1))
+
+
+def test_without_a_majority_every_run_has_its_own_noise():
+    variance = campaign_noise(rescaled(rescaled(decays(), 2, 3.0), 1, 3.0), Settings().noise).variance
+    assert len(set(variance.values())) == 4
+
+
+def test_of_two_meanings_of_a_stated_noise_that_the_records_allow_the_larger_is_used():
+    """A noise that is taken too small is a gap."""
+    step = 0.5 * NOISE  # rounding adds 2 % to the variance
+    total = NOISE**2 + step**2 / 12.0
+    larger = 0
+    for seed in range(20):
+        found = campaign_noise(decays(seed, resolution=step, stated_noise=NOISE), Settings().noise)
+        larger += found.used == pytest.approx(total)
+    assert larger == 20
 
 
 @pytest.mark.parametrize("step", [2.0 * np.pi / 3.0 / 4096.0, 2e-3, 5e-3])
