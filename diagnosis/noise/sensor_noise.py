@@ -214,7 +214,7 @@ def campaign_noise(campaign: Campaign, chosen: NoiseSettings) -> Noise:
 
 
 def _alike(variances: Array, relative: Array, rate: float) -> NDArray[np.bool_]:
-    """Whether the noise of each run agrees with the noise of most runs, shape (runs,); all False without a majority.
+    """Whether each run has the noise of most runs, shape (runs,); all False where no noise is that of most.
 
     Args:
         variances: shape (runs,), rad².

@@ -51,6 +51,10 @@ ODD_HOLDS: Final = 0.5
 """Minimum share of the gap in each of several odd runs, relative to the gap of the remaining runs. Convention.
 Most of it."""
 
+SUSPECT_HOLDS: Final = 0.75
+"""Minimum share of the misfit of a set that vanishes without one run for the campaign to be studied without it,
+where no set explains the runs. Judgement. A fit that an odd run has spoilt seldom finds back to chance."""
+
 _SETS, _RUNS = 6, 2  # number of sets, and of runs for each, that are refitted
 
 
@@ -107,7 +111,28 @@ def odd_runs(measured: Campaign, study: Study) -> tuple[Disturbance, ...]:
         at_random = None if answer.moment is None else answer.moment.left
         rivals = [answer.hypothesis] if answer.hypothesis is not None and at_random is None else []
     rivals += [one for rival in study.rivals for one in rival.hypotheses]
-    return _stated(_simplest(found, rivals, nominal, at_random), measured, nominal)
+    odd = _simplest(found, rivals, nominal, at_random)
+    if odd is None and study.causes == UNKNOWN:
+        odd = _suspect(_sets(study), nominal)
+    return _stated(odd, measured, nominal)
+
+
+def _suspect(sets: Sequence[Hypothesis], nominal: Fit) -> OddRuns | None:
+    """The run without which a set's misfit nearly vanishes, for the set that then leaves least; None: no run is.
+
+    Args:
+        sets: the weighed sets, none of which explains the runs.
+        nominal: fit of the nominal model to all runs.
+    """
+    whole = {one.effects: one.fit.total - one.fit.count for one in sets}
+    clear = [
+        odd
+        for odd in _without_a_run([Hypothesis((), nominal), *sets])
+        if max(odd.p_values.values()) < nominal.settings.selection.disturbed_rate
+        and odd.beside.fit.total - odd.beside.fit.count
+        < (1.0 - SUSPECT_HOLDS) * whole.get(odd.beside.effects, -np.inf)
+    ]
+    return min(clear, key=lambda odd: odd.beside.fit.total - odd.beside.fit.count, default=None)
 
 
 def _stated(odd: OddRuns | None, measured: Campaign, nominal: Fit) -> tuple[Disturbance, ...]:

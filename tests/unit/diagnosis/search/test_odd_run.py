@@ -134,6 +134,16 @@ def test_a_cause_of_all_runs_accuses_none() -> None:
     assert found.answer.probability < 0.95
 
 
+def test_a_run_that_spoils_the_fit_of_two_causes_is_left_out() -> None:
+    """The limit of all runs is far from the limit of the others: no fit that starts there comes down to chance."""
+    causes = {"sensor_clipping": {"limit": 0.25}, "coulomb_friction": {"friction_moment": 0.003}}
+    data = campaign(*(effect_from(name, given) for name, given in causes.items()), duration=6.0)
+    amplified = spoilt(data, "r5", lambda yaw: yaw / 1.3)
+    found = investigate(amplified, tuple(map(effect_class, causes)))
+    assert [(one.run, one.left_out) for one in found.disturbed] == [("r5", True)]
+    assert found.causes == tuple(sorted(causes))
+
+
 @pytest.fixture(scope="module")
 def answer(plain: Campaign) -> Diagnosis:
     return diagnose(spoilt(plain, "r5", clipped), kinds=FEW)
