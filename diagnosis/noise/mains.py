@@ -43,6 +43,7 @@ Judgement."""
 #: Fastest swelling of its amplitude that is sought, Hz.
 _SWELL_UP_TO = 0.6
 _KNOTS = 12.0  # per cycle of the motion: a curve follows motions slower than six times it
+_BELOW = 0.6  # of a line: up to there a curve follows the motion beside it
 _NEAR = 0.25  # of 1/duration: range in which the frequency of a line is refined
 
 
@@ -155,8 +156,6 @@ def remove_hum(
         bound 24 S²/(a² n T²) (Rife & Boorstyn, IEEE Trans. Inf. Theory 20 (1974) 591, doi
         10.1109/TIT.1974.1055282).
     """
-    from scipy.signal.windows import tukey  # only here: slow to load
-
     shown = _showing(campaign, frequency, motion)
     harmonic = _strongest(shown, frequency)
     swells = _swells(shown, frequency, harmonic, variance, chosen.hum_swell_rate)
@@ -170,8 +169,10 @@ def remove_hum(
         flat = np.hanning(record.time_s.size)
         swelling = [_swell(record, harmonic * frequency)] if swells and harmonic in multiples else []
         design = np.column_stack([_lines(record, frequency, multiples), *swelling])
-        # a window that keeps the ends, where a swelling hum may be strongest
-        clear, reading = _without_motion(record, tukey(record.time_s.size, 0.3) if swells else flat)
+        # a window is blind to the ends, where a swelling or wandering hum goes its own way
+        places = [abs(float(apparent(k * frequency, record.sample_interval))) for k in multiples]
+        highest = min(0.5 * _KNOTS * motion_frequency(record), _BELOW * min(places))
+        clear, reading = _beyond(record, highest) if swells else _without_motion(record, flat)
         coefficients = np.linalg.lstsq(clear(design), reading, rcond=None)[0]
         wave: Array = design @ coefficients
         cleaned.append(dataclasses.replace(run, record=Record(record.time_s, record.yaw_rad - wave)))
@@ -284,8 +285,15 @@ def _without_motion(record: Record, window: Array) -> tuple[Callable[[Array], Ar
     if record.uniform:
         level = np.linspace(record.yaw_rad[0], record.yaw_rad[-1], record.yaw_rad.size)
         return lambda columns: columns * window[:, None], (record.yaw_rad - level) * window
-    piece = max(2, round(record.sample_rate / (_KNOTS * motion_frequency(record))))
-    curve = SmoothCurve(record.time_s, piece)
-    return lambda columns: curve.residuals(columns) * window[:, None], curve.residuals(
-        record.yaw_rad
-    ) * window
+    clear, reading = _beyond(record, 0.5 * _KNOTS * motion_frequency(record))
+    return lambda columns: clear(columns) * window[:, None], reading * window
+
+
+def _beyond(record: Record, highest: float) -> tuple[Callable[[Array], Array], Array]:
+    """A function that removes a smooth curve from columns of samples, and the reading without its curve.
+
+    Args:
+        highest: frequency up to which the curve follows a motion, Hz.
+    """
+    curve = SmoothCurve(record.time_s, max(2, round(0.5 * record.sample_rate / highest)))
+    return curve.residuals, curve.residuals(record.yaw_rad)

@@ -318,3 +318,31 @@ def test_a_hum_that_swells_is_taken_out_too_and_a_steady_one_costs_no_more(depth
     columns = 2 * 5 + (2 * 7 if depth else 0)
     noise = columns / clean.runs[0].record.yaw_rad.size * NOISE**2
     assert np.mean(left) < 3.0 * noise + 0.01 * hum.excess * NOISE**2
+
+
+def wandering(data, amplitude):
+    """A hum whose frequency walks at random: by 2 mHz in half a second, as on a large grid, and ten times that."""
+    rng = np.random.default_rng(5)
+
+    def add(t, y):
+        knots = np.arange(0.0, t[-1] + 1.0, 0.5)
+        turns = np.concatenate(
+            [[0.0], np.cumsum(0.5 * (50.0 + np.cumsum(rng.normal(0.0, 0.02, knots.size - 1))))]
+        )
+        return y + amplitude * np.sin(
+            2.0 * np.pi * np.interp(t, knots, turns) + rng.uniform(0.0, 2.0 * np.pi)
+        )
+
+    return with_records(data, add)
+
+
+def test_a_hum_that_wanders_is_taken_out_at_the_ends_as_well():
+    """The rest of a hum at an end would be a burst, as no steady noise has."""
+    clean, amplitude = decays(duration=12.0), 4e-3
+    data = wandering(clean, amplitude)
+    frequency = refine_frequency(data, 50.0)
+    cleaned, _ = remove_hum(data, frequency, NOISE**2, Settings().read_off)
+    apart = [a.record.yaw_rad - b.record.yaw_rad for a, b in zip(cleaned.runs, clean.runs, strict=True)]
+    ends = np.concatenate([np.concatenate([one[:300], one[-300:]]) for one in apart])
+    assert np.mean(np.concatenate(apart) ** 2) < 0.01 * 0.5 * amplitude**2
+    assert np.mean(ends**2) < 0.02 * 0.5 * amplitude**2
