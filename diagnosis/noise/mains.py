@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -43,7 +43,7 @@ Judgement."""
 #: Fastest swelling of its amplitude that is sought, Hz.
 _SWELL_UP_TO = 0.6
 _KNOTS = 12.0  # per cycle of the motion: a curve follows motions slower than six times it
-_BELOW = 0.6  # of a line: up to there a curve follows the motion beside it
+_BELOW = 0.6  # of the lowest line: a curve follows the motion up to there
 _NEAR = 0.25  # of 1/duration: range in which the frequency of a line is refined
 
 
@@ -116,7 +116,11 @@ def refine_frequency(campaign: Campaign, frequency: float, motion: float = REFER
         motion: frequency of the fastest motion, Hz; a line is sought beyond its harmonics.
     """
     shown = _showing(campaign, frequency, motion)
-    cleared = [_without_motion(r, np.hanning(r.time_s.size))[1] for r, multiples in shown if multiples]
+    cleared = [
+        _without_motion(record, frequency, multiples, np.hanning(record.time_s.size))[1]
+        for record, multiples in shown
+        if multiples
+    ]
 
     def left(trial: float) -> float:
         total = 0.0
@@ -169,10 +173,10 @@ def remove_hum(
         flat = np.hanning(record.time_s.size)
         swelling = [_swell(record, harmonic * frequency)] if swells and harmonic in multiples else []
         design = np.column_stack([_lines(record, frequency, multiples), *swelling])
-        # a window is blind to the ends, where a swelling or wandering hum goes its own way
-        places = [abs(float(apparent(k * frequency, record.sample_interval))) for k in multiples]
-        highest = min(0.5 * _KNOTS * motion_frequency(record), _BELOW * min(places))
-        clear, reading = _beyond(record, highest) if swells else _without_motion(record, flat)
+        if swells:  # a window is blind to the ends, where a swelling or wandering hum goes its own way
+            clear, reading = _beyond_motion(record, frequency, multiples)
+        else:
+            clear, reading = _without_motion(record, frequency, multiples, flat)
         coefficients = np.linalg.lstsq(clear(design), reading, rcond=None)[0]
         wave: Array = design @ coefficients
         cleaned.append(dataclasses.replace(run, record=Record(record.time_s, record.yaw_rad - wave)))
@@ -232,7 +236,7 @@ def _strongest(shown: Sequence[tuple[Record, list[int]]], frequency: float) -> i
     powers = dict.fromkeys(HARMONICS, 0.0)
     for record, multiples in shown:
         if multiples:
-            clear, reading = _without_motion(record, np.hanning(record.time_s.size))
+            clear, reading = _without_motion(record, frequency, multiples, np.hanning(record.time_s.size))
             found = np.linalg.lstsq(clear(_lines(record, frequency, multiples)), reading, rcond=None)[0]
             for multiple, pair in zip(multiples, found.reshape(-1, 2), strict=True):
                 powers[multiple] += float(pair @ pair)
@@ -249,7 +253,7 @@ def _swells(
             continue
         steady = _lines(record, frequency, multiples)
         window = np.hanning(record.time_s.size)
-        clear, reading = _without_motion(record, window)
+        clear, reading = _without_motion(record, frequency, multiples, window)
         columns = clear(np.column_stack([steady, _swell(record, harmonic * frequency)]))
         both = np.linalg.qr(columns)[0][:, steady.shape[1] :]
         # windowed white noise has the window's mean square
@@ -276,8 +280,12 @@ def _swell(record: Record, frequency: float) -> Array:
     return np.stack([wave * s for s in slow for wave in (np.sin(phase), np.cos(phase))], axis=1)
 
 
-def _without_motion(record: Record, window: Array) -> tuple[Callable[[Array], Array], Array]:
-    """A function that removes the slow motion from columns of samples, and the windowed reading without it.
+#: A function that removes the motion from columns of samples, shape (n, k), and the reading without it, shape (n,).
+_Cleared: TypeAlias = tuple[Callable[[Array], Array], Array]
+
+
+def _without_motion(record: Record, frequency: float, multiples: Sequence[int], window: Array) -> _Cleared:
+    """Columns and the reading, windowed, without the motion below some multiples of a frequency.
 
     The window keeps the motion from leaking into a line far above it. Unevenly spaced samples spread it over all
     frequencies, so a curve removes it first.
@@ -285,15 +293,13 @@ def _without_motion(record: Record, window: Array) -> tuple[Callable[[Array], Ar
     if record.uniform:
         level = np.linspace(record.yaw_rad[0], record.yaw_rad[-1], record.yaw_rad.size)
         return lambda columns: columns * window[:, None], (record.yaw_rad - level) * window
-    clear, reading = _beyond(record, 0.5 * _KNOTS * motion_frequency(record))
+    clear, reading = _beyond_motion(record, frequency, multiples)
     return lambda columns: clear(columns) * window[:, None], reading * window
 
 
-def _beyond(record: Record, highest: float) -> tuple[Callable[[Array], Array], Array]:
-    """A function that removes a smooth curve from columns of samples, and the reading without its curve.
-
-    Args:
-        highest: frequency up to which the curve follows a motion, Hz.
-    """
+def _beyond_motion(record: Record, frequency: float, multiples: Sequence[int]) -> _Cleared:
+    """Columns and the reading without a smooth curve, which follows the motion and no line."""
+    lines = [abs(float(apparent(k * frequency, record.sample_interval))) for k in multiples]
+    highest = min(0.5 * _KNOTS * motion_frequency(record), _BELOW * min(lines))
     curve = SmoothCurve(record.time_s, max(2, round(0.5 * record.sample_rate / highest)))
     return curve.residuals, curve.residuals(record.yaw_rad)

@@ -346,3 +346,23 @@ def test_a_hum_that_wanders_is_taken_out_at_the_ends_as_well():
     ends = np.concatenate([np.concatenate([one[:300], one[-300:]]) for one in apart])
     assert np.mean(np.concatenate(apart) ** 2) < 0.01 * 0.5 * amplitude**2
     assert np.mean(ends**2) < 0.02 * 0.5 * amplitude**2
+
+
+def test_of_uneven_samples_a_hum_near_a_fast_motion_is_taken_out():
+    """The curve that takes out the motion first follows no line, though it could follow one of this frequency."""
+    fast = (Setting(750.0, 0.0), Setting(750.0, 20.0), Setting(600.0, 20.0))
+    clean = free_decays.campaign(fast, noise=NOISE, rate=1000.0, duration=4.0, rng=np.random.default_rng(6))
+    data, rng = humming(clean, 2e-3), np.random.default_rng(7)
+    kept = [np.flatnonzero(rng.random(run.record.time_s.size) < 0.7) for run in data.runs]
+
+    def some(campaign):
+        runs = [
+            replace(run, record=Record(run.record.time_s[place], run.record.yaw_rad[place]))
+            for run, place in zip(campaign.runs, kept, strict=True)
+        ]
+        return replace(campaign, runs=tuple(runs))
+
+    cleaned, hum = remove_hum(some(data), 50.0, NOISE**2, Settings().read_off, motion=13.7)
+    assert hum.amplitude == pytest.approx(2e-3, rel=0.05)
+    for one, other in zip(cleaned.runs, some(clean).runs, strict=True):
+        assert np.mean((one.record.yaw_rad - other.record.yaw_rad) ** 2) < 0.02 * 0.5 * 2e-3**2
