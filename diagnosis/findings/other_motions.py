@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from identification.examination.self_excited import in_limit_cycle
-from identification.show.numbers import joined_mark, listed, significant, unit_shown
+from identification.show.numbers import joined_mark, listed, significant, span, unit_shown
 from identification.signal.frequency import starting_frequency, thinned_reading
 from identification.status import Remark
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -165,7 +166,7 @@ def second_mode_words(found: Sequence[TwoModes], unit: str) -> str:
     main, second = (
         _modes_words(modes, unit) for modes in zip(*((one.main, one.second) for one in found), strict=True)
     )
-    closes = _range([100.0 * mode.closes for mode in found], 2)
+    closes = span([100.0 * mode.closes for mode in found], partial(significant, digits=2))
     return (
         f"{contain} a second mode: {second}. The main mode is {main}. The second mode explains {closes} % of the "
         "residual of one free decay. A rig with one degree of freedom has one mode: look for another motion, such "
@@ -176,12 +177,7 @@ def second_mode_words(found: Sequence[TwoModes], unit: str) -> str:
 def _modes_words(modes: Sequence[Mode], unit: str) -> str:
     """Amplitudes, frequencies and decay rates of modes, each from the least to the greatest."""
     mark, factor = unit_shown(unit)
-    amplitude = _range([factor * mode.amplitude_rad for mode in modes], 2) + joined_mark(mark)
+    two, three = (partial(significant, digits=digits) for digits in (2, 3))
+    amplitude = span([factor * mode.amplitude_rad for mode in modes], two) + joined_mark(mark)
     frequency, rate = [mode.frequency_hz for mode in modes], [mode.decay_per_s for mode in modes]
-    return f"{amplitude} at {_range(frequency, 3)} Hz, decaying at {_range(rate, 2)} 1/s"
-
-
-def _range(values: Sequence[float], digits: int) -> str:
-    """Such as ``0.04 to 0.11``; one number where both ends round to the same."""
-    least, most = significant(min(values), digits), significant(max(values), digits)
-    return least if least == most else f"{least} to {most}"
+    return f"{amplitude} at {span(frequency, three)} Hz, decaying at {span(rate, two)} 1/s"

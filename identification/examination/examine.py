@@ -17,6 +17,7 @@ from identification.examination.free_motion import find_release, with_zeros, wit
 from identification.examination.self_excited import self_excited_runs, swing_of
 from identification.examination.slips.base import SlipEvidence
 from identification.examination.slips.table import found_in, mended
+from identification.show.numbers import span
 from identification.show.quantity import Quantity
 from identification.status import Examined, Outcome, Remark
 from tunnel_sim.files.plausible import few_samples
@@ -218,7 +219,7 @@ def with_clocks(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
     gappy = [(run, clock) for run, clock in found if clock is not None and clock.missing]
     remarks = []
     if rounded:
-        interval = _range([1e3 * clock.interval for _, clock in rounded])
+        interval = span([1e3 * clock.interval for _, clock in rounded], "{:.6g}".format)
         away = max(clock.away / clock.interval for _, clock in rounded)
         what = (
             f"the time stamps are rounded, by up to {100.0 * away:.0f} % of a step; a uniform clock of "
@@ -228,7 +229,7 @@ def with_clocks(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
         remarks.append(Remark(Outcome.NOTED, ids, what, "write time_s with more digits"))
     if uneven:
         steps = [1e3 * np.diff(run.record.time_s) for run in uneven]
-        between = _range([float(end) for step in steps for end in (step.min(), step.max())])
+        between = span([float(end) for step in steps for end in (step.min(), step.max())], "{:.6g}".format)
         what = f"the samples are not evenly spaced (steps of {between} ms); they are used at the times given"
         remedy = "check that time_s is when the samples were taken"
         remarks.append(Remark(Outcome.NOTED, tuple(run.id for run in uneven), what, remedy))
@@ -286,8 +287,3 @@ def find_clock(time_s: Array) -> SampleClock | None:
         if away <= max(allowed, CLOCK_TOLERANCE * interval):
             return SampleClock(interval, place.astype(np.int64), clock, away)
     return None
-
-
-def _range(values: list[float]) -> str:
-    low, high = f"{min(values):.6g}", f"{max(values):.6g}"
-    return low if low == high else f"{low} to {high}"

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
@@ -363,6 +363,12 @@ def to_interval(given: Quantity) -> tuple[str, int]:
     if given.interval is not None and reach > least:
         return f"{text(given.value)} ({text(low)} to {text(high)})", places
     return text(given.value) + (f" ± {text(max(reach, least))}" if reach else ""), places
+
+
+def span(values: Sequence[float], text: Callable[[float], str]) -> str:
+    """The range of values, such as ``0.04 to 0.11``; one number where the texts of both ends are the same."""
+    least, most = text(min(values)), text(max(values))
+    return least if least == most else f"{least} to {most}"
 
 
 def sentence_case(words: str) -> str:
