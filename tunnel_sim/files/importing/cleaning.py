@@ -11,7 +11,7 @@ from math import floor, log10
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_sim.files.importing.tables import LEAST_ROWS, SERIES_APART
+from tunnel_sim.files.importing.tables import LEAST_ROWS, are_series
 from tunnel_sim.vocabulary.errors import TunnelError, counted
 from tunnel_sim.vocabulary.quantities import PerSample, Readings, Seconds, Times
 from tunnel_sim.vocabulary.record import Array
@@ -188,8 +188,7 @@ def _series(time: Times, reading: Readings) -> int:
     if usual < 2 or whole.size < max(LEAST_ROWS, (1.0 - _FEW) * each.size):
         return 1
     rows = reading[whole[:, np.newaxis] + np.arange(usual)]
-    one, several = (float(np.mean(np.diff(part, 4, axis=0) ** 2)) for part in (rows.ravel(), rows))
-    return usual if one > SERIES_APART**2 * several else 1
+    return usual if are_series(rows.ravel(), rows.T) else 1
 
 
 def _spread(time: Times, rows: NDArray[np.intp]) -> Times:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -29,8 +29,7 @@ _RUN_NAMES = re.compile(
 )
 LEAST_ROWS = 16
 """Minimum number of rows of a record: a shorter table beside longer ones holds conditions or sizes."""
-SERIES_APART = 3.0
-"""Ratio of the roughness of several series in one column to their own, above which they are several."""
+_APART = 3.0  # ratio of the roughness of a column to that of its series, above which they are several
 _LEAST_EACH = 8  # rows of a run, on average: a column that changes more often does not number runs
 
 
@@ -158,6 +157,12 @@ def with_input_facts(table: Table) -> Table:
 def hold_order(text: str) -> float:
     """The order of a hold from its text in a file: 0 for ``zero``, 1 for ``linear``, NaN for any other text."""
     return float(HOLDS.index(text)) if text in HOLDS else float("nan")
+
+
+def are_series(column: Rows, parts: Iterable[Rows]) -> bool:
+    """Whether the parts of a column are series of their own: each is smooth, and the column jumps between them."""
+    apart = np.concatenate([np.diff(part, 4) for part in parts])
+    return float(np.mean(np.diff(column, 4) ** 2)) > _APART**2 * float(np.mean(apart**2))
 
 
 def by_texts(table: Table, column: str, texts: pl.Series) -> list[Table]:

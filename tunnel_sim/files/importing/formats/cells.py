@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 import polars as pl
 
-from tunnel_sim.files.importing.tables import LEAST_ROWS, SERIES_APART
+from tunnel_sim.files.importing.tables import LEAST_ROWS, are_series
 from tunnel_sim.vocabulary.errors import counted, one_line
 from tunnel_sim.vocabulary.quantities import Rows
 
@@ -101,10 +101,7 @@ def without_short_tables(
 
 
 def series_by(labels: pl.Series, values: Rows) -> int:
-    """The number of series in a column of numbers that a column of texts distinguishes; 1: it is one series.
-
-    Within its rows a series is smooth, and from a row of one series to a row of another it jumps.
-    """
+    """The number of series in a column of numbers that a column of texts distinguishes; 1: it is one series."""
     labels = labels.fill_null("")
     groups = [
         labels.eq(name).to_numpy() & np.isfinite(values) for name in labels.unique().head(_MOST_SERIES + 1)
@@ -113,10 +110,8 @@ def series_by(labels: pl.Series, values: Rows) -> int:
     changes = int((labels != labels.shift()).sum())
     if not 1 < len(groups) <= _MOST_SERIES or changes < 2 * LEAST_ROWS:  # else runs one after another
         return 1
-    bends = [np.diff(values[rows], 4) ** 2 for rows in groups]
-    together = np.diff(values[np.any(groups, axis=0)], 4) ** 2
-    apart = float(np.mean(np.concatenate(bends)))
-    return len(groups) if float(np.mean(together)) > SERIES_APART**2 * apart else 1
+    column = values[np.any(groups, axis=0)]
+    return len(groups) if are_series(column, (values[rows] for rows in groups)) else 1
 
 
 def unread_in(column: pl.Series, number: pl.Series) -> tuple[str, ...]:
