@@ -66,9 +66,9 @@ from diagnosis.where.described import Nowhere, PlaceFound, Where, described, now
 from diagnosis.where.maps import Maps
 from diagnosis.where.place import blow_interval
 from diagnosis.where.survey import with_answer
-from identification._identify import identify_examined
 from identification.estimate import Estimate
 from identification.estimators import make_estimator
+from identification.identifying import identify_examined
 from identification.show.quantity import Quantity
 from identification.status import Examined, Remark, left_out_as_asked
 from tunnel_sim.effects import BetweenRuns, effect_class

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from tunnel_sim.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from identification._identify import identify
     from identification.checking import check_estimator
     from identification.datasets import (
         MEASURED_CAMPAIGNS,
@@ -19,13 +18,14 @@ if TYPE_CHECKING:
     )
     from identification.estimate import Estimate, NoiseLevel, RunEstimate, WindowEstimate
     from identification.estimators import ALL_ESTIMATORS, Estimator, make_estimator, register_estimator
+    from identification.identifying import identify
     from identification.show.quantity import Quantity
     from identification.status import Remark, Status
 else:
     __getattr__, __dir__ = lazy_names(
         __name__,
         {
-            "._identify": "identify",
+            ".identifying": "identify",
             ".checking": "check_estimator",
             ".datasets": "MEASURED_CAMPAIGNS measured_campaign paper_derivatives paper_springs paper_windows",
             ".estimate": "Estimate NoiseLevel Quantity RunEstimate WindowEstimate",

@@ -75,10 +75,10 @@ def models_in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def unexamined(monkeypatch: pytest.MonkeyPatch) -> None:
     """Identify records as they are: their examination takes most of the time, and has tests of its own."""
-    from identification import _identify
+    from identification import identifying
     from identification.examination.examine import Examined
 
-    monkeypatch.setattr(_identify, "examine", lambda campaign: Examined(campaign, ()))
+    monkeypatch.setattr(identifying, "examine", lambda campaign: Examined(campaign, ()))
 
 
 @pytest.fixture

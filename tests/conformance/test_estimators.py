@@ -45,7 +45,7 @@ def examined_once():
         return kept[id(campaign)][1]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("identification._identify.examine", once)
+        patch.setattr("identification.identifying.examine", once)
         yield
 
 
