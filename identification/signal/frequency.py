@@ -21,7 +21,7 @@ from identification.signal.decay_fit import Reading, mean_of_blocks, projected_c
 from identification.signal.free_decay import Decay
 from identification.signal.noise import PEAK_HALF_TURN, PeakNoise
 from identification.statistics import inner
-from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced, read_only
+from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced, read_only, running_integral
 
 Complex = NDArray[np.complex128]
 # Fourth powers of readings and of times are summed over a record: beyond these limits they overflow or underflow.
@@ -175,8 +175,8 @@ def starting_decay(record: Record) -> Decay | None:
     candidates = [Decay.from_modal(omega / np.sqrt(1.0 - zeta**2), zeta) for zeta in _DAMPING_RATIOS]
     # y + 2a∫y + k∬y = c₀ + c₁t + c₂t²: linear in a and k, and integration reduces the noise.
     time, yaw = thin.time, thin.yaw
-    once = _integral(time, yaw)
-    twice = _integral(time, once)
+    once = running_integral(yaw, time)
+    twice = running_integral(once, time)
     columns = np.column_stack((once, twice, np.ones_like(time), time, time**2))
     scale = np.linalg.norm(columns, axis=0)
     solution = np.linalg.lstsq(columns / scale, -yaw, rcond=None)[0] / scale
@@ -273,14 +273,8 @@ def thinned_reading(record: Record, frequency: float) -> Reading:
     )
 
 
-def _integral(time: Array, values: Array) -> Array:
-    steps = np.diff(time) * 0.5 * (values[1:] + values[:-1])
-    return np.concatenate(([0.0], np.cumsum(steps)))
-
-
-PEAK_HALF_WIDTH = PEAK_HALF_TURN / (
-    2.0 * np.pi
-)  # share of a period on either side of a peak, for the fit of its parabola
+# share of a period on either side of a peak, for the fit of its parabola
+PEAK_HALF_WIDTH = PEAK_HALF_TURN / (2.0 * np.pi)
 _LEAST_SAMPLES = 1.5001  # minimum number of samples on either side of a peak: its parabola needs three
 _LEAST_PEAKS = 4
 _MOVES = 8  # maximum number of moves, of half a window each

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tunnel_sim.vocabulary.quantities import Angles
-from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.record import Array, running_integral
 
 _WINDOW = 0.12  # share of the time between reversals, on both sides of one: the motion is a parabola there
 _FEWEST = 2  # minimum number of samples on either side
@@ -92,7 +92,7 @@ def strokes(
     if moment is not None:
         path = angle.copy()
         path[turns] = extreme
-        work = np.concatenate([[0.0], np.cumsum(0.5 * (moment[1:] + moment[:-1]) * np.diff(path))])
+        work = running_integral(moment, path)
         lost = lost + np.diff(work[turns])
     return Strokes(turns, extreme, lost, spread)
 

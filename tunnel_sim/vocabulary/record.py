@@ -129,6 +129,11 @@ HYSTERESIS = 0.03
 NOISE_MARGIN = 4.0  # or by this many standard deviations of the smoothed noise, whichever is larger
 
 
+def running_integral(values: Array, places: Array) -> Array:
+    """The integral of values from the first place to each place, by trapezoids, shape (n,)."""
+    return np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(places))])
+
+
 def count_cycles(record: Record) -> float:
     """Number of cycles of the dominant oscillation within the record; 0 when nothing oscillates.
 

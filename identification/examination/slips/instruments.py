@@ -13,7 +13,7 @@ from identification.examination.slips.base import SlipEvidence, StatementSlip
 from identification.signal.free_decay import Decay, response_rows
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.quantities import Angles
-from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.record import Array, running_integral
 
 _WINDOW = 2.0  # cycles: a Hann window of two cycles removes the zero and twice the frequency
 _FEWEST = 6  # minimum number of phases in a run
@@ -127,8 +127,7 @@ def _phase(swing: Swing) -> _Phase | None:
     noise = float(np.median(np.abs(rough))) / 0.6745 / np.sqrt(1.5)
     std = np.hypot(_PHASE, noise * np.sqrt(3.0 / width) / size)
     relative = middle - middle[0]
-    integrals = [np.concatenate(([0.0], np.cumsum(0.5 * np.diff(relative) * (p[1:] + p[:-1])))) for p in
-                 ((size / size[0]) ** power for power in _POWERS)]  # fmt: skip
+    integrals = [running_integral((size / size[0]) ** power, relative) for power in _POWERS]
     length = float(time[-1])
     return _Phase(
         swing.run.id, phase, std, omega * middle * (middle - length) / (2.0 * length),

@@ -20,6 +20,7 @@ from tunnel_sim.files.importing.free_motion import free_from, free_until
 from tunnel_sim.files.importing.swings import Swings, noise_of, swings_of
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.quantities import Angles, PerSample, Rates, Times
+from tunnel_sim.vocabulary.record import running_integral
 
 _BAND = 0.05  # share of the largest excursion of a run: a smaller one counts as rest
 _NOISES = 5.0  # standard deviations: smaller excursions are noise
@@ -359,12 +360,7 @@ def find_runs_of_rate(time_s: Times, rate: Rates) -> list[RecordPiece]:
         return whole
     # a hand shows in the angle: the body is held, or pulled aside for longer than it takes to swing back
     rate, starts, ends = centred
-    angle = _without_drift(
-        time_s,
-        np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(time_s))]),
-        starts,
-        ends,
-    )
+    angle = _without_drift(time_s, running_integral(rate, time_s), starts, ends)
     drift = noise * sqrt(float(time_s[-1] - time_s[0]) * float(np.median(np.diff(time_s))))  # of summed noise
     found = []
     for piece in find_runs(time_s, angle, drift):
