@@ -152,7 +152,7 @@ def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[Fact, ...]]:
         other, why = (bare, "stiffness not stated") if compared is stated else (stated, "stiffness stated")
         left_out.append(Fact(why, {"runs": [run.id for run in other]}))
     if compared is bare:
-        same = _of_one_spring(bare, derivative, SAME_SPRING)
+        same = _of_one_spring(bare, derivative)
         if len(same) < len(bare):
             left_out.append(Fact("other springs", {"runs": [run.id for run in bare if run not in same]}))
         compared = same
@@ -179,11 +179,11 @@ def _ids(runs: Sequence[Run]) -> str:
     return ", ".join(run.id for run in runs)
 
 
-def _of_one_spring(runs: Sequence[Run], derivative: int, ratio: float) -> list[Run]:
+def _of_one_spring(runs: Sequence[Run], derivative: int) -> list[Run]:
     """The largest group of runs that may have one spring.
 
     The air reduces the stiffness of every spring by the same amount, so the order of the frequencies is the same
-    at each speed. Frequencies at one speed within a ``ratio`` belong to one spring.
+    at each speed. Frequencies at one speed within `SAME_SPRING` belong to one spring.
     """
     by_speed: dict[float, list[tuple[float, Run]]] = defaultdict(list)
     setting = speed_groups(run.wind_speed for run in runs)
@@ -195,7 +195,7 @@ def _of_one_spring(runs: Sequence[Run], derivative: int, ratio: float) -> list[R
         ranked = sorted(alike, key=lambda pair: pair[0])
         clusters = [[ranked[0][1]]]
         for (last, _), (now, run) in itertools.pairwise(ranked):
-            if now > ratio * last:
+            if now > SAME_SPRING * last:
                 clusters.append([])
             clusters[-1].append(run)
         groups.append(clusters)

@@ -288,7 +288,9 @@ def _check_failures(subject: _Subject) -> None:
         if not some.runs[0].identified or some.status.failed:
             what = f"fails as a whole with one of {of} among others"
             raise subject.refuse(what, "leave that run out, and give Status.RUN_LEFT_OUT")
-    short = tuple(replace(run, record=_first(run.record, 5)) for run in whole.runs)
+    short = tuple(
+        replace(run, record=Record(run.record.time_s[:5], run.record.yaw_rad[:5])) for run in whole.runs
+    )
     subject.estimate(replace(whole, runs=short), "records of five samples")
 
 
@@ -389,7 +391,3 @@ def _thinned(record: Record, rng: np.random.Generator) -> Record:
     """Nine tenths of the samples, at random."""
     kept = rng.uniform(size=record.time_s.size) < 0.9
     return Record(record.time_s[kept], record.yaw_rad[kept])
-
-
-def _first(record: Record, count: int) -> Record:
-    return Record(record.time_s[:count], record.yaw_rad[:count])

@@ -212,7 +212,6 @@ def trade_off(
     covariance: Array,
     roles: Mapping[str, Role],
     rig: Setting,
-    least: float = TRADE_OFF_CORRELATION,
 ) -> TradeOff | None:
     """The two parameters with the most strongly correlated errors; None if no correlation is large.
 
@@ -221,7 +220,6 @@ def trade_off(
         covariance: covariance of the parameters, in the products of their units, shape (p, p); a parameter that
             the fit does not determine has a variance of zero, and is left out.
         roles: roles by name.
-        least: minimum absolute correlation of two parameters that trade off, a ratio.
     """
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     known = np.flatnonzero((std > 0.0) & np.isfinite(std))
@@ -230,7 +228,7 @@ def trade_off(
     scaled = covariance[np.ix_(known, known)] / np.outer(std[known], std[known])
     sizes = np.triu(np.abs(scaled), 1)
     one, other = np.unravel_index(int(np.argmax(sizes)), sizes.shape)
-    if not sizes[one, other] >= least:
+    if not sizes[one, other] >= TRADE_OFF_CORRELATION:
         return None
     pair = names[known[one]], names[known[other]]
     correlation = float(np.clip(scaled[one, other], -1.0, 1.0))

@@ -210,19 +210,16 @@ def decision(
         unpredictive=first if doubts else "",
         doubts=doubts,
         credible=tuple(credible),
-        effects=_common(causes, IN_COMMON),
-        channels=_common(
-            [({channel_of[name] for name in names & proper}, value) for names, value in causes],
-            IN_COMMON,
-        ),
+        effects=_common(causes),
+        channels=_common(({channel_of[name] for name in names & proper}, value) for names, value in causes),
     )
 
 
-def _common(held: Iterable[tuple[set[str], float]], least: float) -> dict[str, float]:
-    """Elements common to answers with a total probability of ``least``, with it, most probable first."""
+def _common(held: Iterable[tuple[set[str], float]]) -> dict[str, float]:
+    """Elements common to answers with a total probability of `IN_COMMON`, with it, most probable first."""
     found: dict[str, float] = {}
     for names, value in held:
         for name in sorted(names):
             found[name] = min(found.get(name, 0.0) + value, 1.0)
     ranked = sorted(found.items(), key=lambda item: -item[1])
-    return {name: value for name, value in ranked if value >= least}
+    return {name: value for name, value in ranked if value >= IN_COMMON}

@@ -206,7 +206,7 @@ def rival_lines(answer: Findings) -> list[str]:
 
 def _telling_apart(answer: Findings) -> Iterator[NextStep]:
     """Steps that separate the alternatives of a decided answer."""
-    gain = _narrower(answer, "rivals")
+    gain = _narrower(answer)
     run = run_to_make(answer)
     if run is not None and answer.ambiguous_with:
         yield NextStep(
@@ -228,7 +228,7 @@ def _deciding(answer: Findings) -> Iterator[NextStep]:
     if run is not None:
         yield NextStep(
             f"Make one more run: {run.conditions(answer.freedom, robot=robot)}",
-            f"decides between the likely answers{_narrower(answer, 'rivals')}",
+            f"decides between the likely answers{_narrower(answer)}",
         )
         return
     # a stiffness that is stated and can be chosen
@@ -297,13 +297,13 @@ _CUT = {"noise": 0.75, "scatter": 0.75}
 all."""
 
 
-def _narrower(answer: Findings, source: str) -> str:
-    """The coefficient that gains most where a source of uncertainty is removed; empty where none gains a third."""
+def _narrower(answer: Findings) -> str:
+    """The coefficient that gains most if the other answers are ruled out; empty where none gains a third."""
     after = {name: one for name, one in answer.coefficients.after.items() if one.std and one.value}
-    most = max(after, key=lambda name: after[name].shares.get(source, 0.0), default="")
-    if not most or after[most].shares.get(source, 0.0) < _GAINS:
+    most = max(after, key=lambda name: after[name].shares.get("rivals", 0.0), default="")
+    if not most or after[most].shares.get("rivals", 0.0) < _GAINS:
         return ""
-    return f"; {_becomes(most, after[most], after[most].shares[source])}"
+    return f"; {_becomes(most, after[most], after[most].shares['rivals'])}"
 
 
 _GAINS = 0.55  # share of a variance: without it the standard deviation falls by a third

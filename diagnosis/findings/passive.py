@@ -32,27 +32,25 @@ class Truncated:
     interval: tuple[float, float]
 
 
-def truncated(value: float, std: float, lower: float, upper: float, probability: float = 0.95) -> Truncated:
-    """A normal distribution within bounds, in the unit of all four.
+def truncated(value: float, std: float, upper: float, probability: float) -> Truncated:
+    """A normal distribution between 0 and a bound, in the unit of the first three.
 
     Args:
         value: mean of the unbounded distribution, clipped to the bounds.
         std: standard deviation of the unbounded distribution, above 0.
-        lower: lower bound.
-        upper: upper bound, above ``lower``.
+        upper: upper bound, above 0.
         probability: probability of the interval.
     """
     tail = 0.5 * (1.0 - probability)
-    if std > _WIDE * (upper - lower):
-        low, high = ((1.0 - t) * lower + t * upper for t in (tail, 1.0 - tail))
-        return Truncated(0.5 * (lower + upper), (upper - lower) / math.sqrt(12.0), (low, high))
-    a, b = (lower - value) / std, (upper - value) / std
+    if std > _WIDE * upper:
+        return Truncated(0.5 * upper, upper / math.sqrt(12.0), (tail * upper, (1.0 - tail) * upper))
+    a, b = -value / std, (upper - value) / std
     inside = float(ndtr(b) - ndtr(a))
     at_a, at_b = (math.exp(-0.5 * x * x) / math.sqrt(2.0 * math.pi) for x in (a, b))
     moved = (at_a - at_b) / inside
     spread = math.sqrt(1.0 + (a * at_a - b * at_b) / inside - moved**2)
     low, high = (value + std * float(ndtri(ndtr(a) + t * inside)) for t in (tail, 1.0 - tail))
-    return Truncated(value + std * moved, std * spread, (max(low, lower), min(high, upper)))
+    return Truncated(value + std * moved, std * spread, (max(low, 0.0), min(high, upper)))
 
 
 def within_bounds(given: Mapping[str, Quantity], study: Study) -> dict[str, Quantity]:
@@ -86,7 +84,7 @@ def within_bounds(given: Mapping[str, Quantity], study: Study) -> dict[str, Quan
         if not (estimate.value - 2.0 * std < 0.0 or estimate.value + 2.0 * std > upper) or upper <= 0.0:
             continue
         value = min(max(estimate.value, 0.0), upper)
-        own = truncated(value, min(std, 1e6 * upper), 0.0, upper, chosen.coefficient_interval)
+        own = truncated(value, min(std, 1e6 * upper), upper, chosen.coefficient_interval)
         apart = math.hypot(own.std, own.mean - value)
         found[name] = replace(
             estimate, value=value, std=min(std, apart), interval=own.interval, bound=None, determined=True

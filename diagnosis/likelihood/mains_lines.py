@@ -67,11 +67,10 @@ class MainsLine(SpectralLine):
         amplitude: amplitude of the line at the sensor, rad, root mean square over the runs concerned.
         phases: of sine, rad, by run, shape (runs,); zero for runs not concerned.
         harmonic: the multiple.
-        concerned: numbers of the runs that are searched for the line.
         freedom: twice the number of pieces of records with added powers.
         trials: number of independent places searched for mains lines, over all lines.
-        powers: drop of χ² of every run concerned, dimensionless, shape (concerned,).
-        pieces: number of pieces of every run concerned, shape (concerned,).
+        powers: drop of χ² of every run concerned, dimensionless, shape (runs concerned,).
+        pieces: number of pieces of every run concerned, shape (runs concerned,).
         later: power in the later halves of these runs over the power in the earlier halves, dimensionless.
         evidence: drop of χ² beyond chance, at all visible multiples of the frequency, dimensionless.
         folds: number of times the line is folded, in the run of the lowest sample rate.
@@ -81,7 +80,6 @@ class MainsLine(SpectralLine):
     """
 
     harmonic: int
-    concerned: tuple[int, ...]
     freedom: int
     trials: float
     powers: Array
@@ -366,7 +364,6 @@ def _line(
         float(np.sqrt(1.5 * np.mean(np.abs(sines) ** 2))),
         phases,
         harmonic=harmonic,
-        concerned=concerned,
         freedom=2 * sum(run.count for run in among),
         trials=trials,
         powers=powers,

@@ -282,19 +282,18 @@ def scatter_between(
     )
 
 
-def ratio_limit(free: int, rate: float = policy.DIFFERENCE_RATE) -> float:
-    """The likelihood ratio, −2 ln, beyond which widths count.
+def ratio_limit(free: int) -> float:
+    """The likelihood ratio, −2 ln, which runs without scatter exceed at the rate `policy.DIFFERENCE_RATE`.
 
     Args:
         free: number of estimated widths, 1 or more.
-        rate: maximum probability of exceeding the limit where no run scatters.
     """
-    low, high = 0.0, float(chdtri(free, rate))
+    low, high = 0.0, float(chdtri(free, policy.DIFFERENCE_RATE))
     while high - low > 1e-6:  # the mixture lies between χ² of free − 1 and of free degrees of freedom
         middle = 0.5 * (low + high)
         fewer = float(chdtrc(free - 1, middle)) if free > 1 else 0.0
         beyond = 0.5 * (fewer + float(chdtrc(free, middle)))
-        low, high = (middle, high) if beyond > rate else (low, middle)
+        low, high = (middle, high) if beyond > policy.DIFFERENCE_RATE else (low, middle)
     return high
 
 

@@ -48,12 +48,7 @@ class SpringFit:
     p_value: float
 
 
-def fit_springs(
-    stiffness: Sequence[float],
-    frequency_hz: Sequence[float],
-    *,
-    rng: np.random.Generator | None = None,
-) -> SpringFit:
+def fit_springs(stiffness: Sequence[float], frequency_hz: Sequence[float]) -> SpringFit:
     """Fit the line by least squares and flag outliers.
 
     The line is the paper's: unweighted, through all springs. The flags come from the inertia of each spring by
@@ -67,7 +62,6 @@ def fit_springs(
     Args:
         stiffness: Kr per spring, N m/rad, shape (n,), n ≥ 3.
         frequency_hz: wind-off frequency with each spring, Hz, shape (n,).
-        rng: generator for the calibration; None: a fixed seed, so that the result is repeatable.
 
     Raises:
         TunnelError: with fewer than three springs, unequal lengths or values that are not positive.
@@ -93,7 +87,7 @@ def fit_springs(
     fitted = line[0] * omega_squared + line[1]
     flagged, p_value = np.zeros(springs.size, dtype=bool), 1.0
     if springs.size > 3:  # two correct springs of three cannot outvote a wrong one
-        rng = np.random.default_rng(1) if rng is None else rng
+        rng = np.random.default_rng(1)  # so that the result is repeatable
         chances, order = _take_out_the_worst((springs / omega_squared)[None, :])
         least = _take_out_the_worst(rng.standard_normal((_TRIALS, springs.size)))[0].min(axis=1)
         beyond = np.flatnonzero(chances[0] <= np.quantile(least, SPRING_FLAG_RATE))

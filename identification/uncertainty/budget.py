@@ -132,7 +132,6 @@ def load_uncertainties(path: Path) -> InputUncertainties:
 
 Identify = Callable[[Campaign], Estimate]
 Progress = Callable[[str], None]
-_STEP = 1e-4  # relative change of an input for finding its influence on (a, k) by a finite difference
 _NAMES = (*PARAMETERS, "wind_off_inertia")
 # Exponents of a common scale of a stated input; the clock's is the scale of the time axis.
 _POWERS: Mapping[str, tuple[float, float, float, float, float]] = {

@@ -40,7 +40,7 @@ def test_the_pair_of_the_greatest_correlation_of_either_sign_is_found_whatever_t
 def test_nothing_is_said_below_the_stated_correlation_or_of_what_is_not_known():
     matrix = covariance([[1.0, 0.97], [0.97, 1.0]], [1.0, 2.0])
     assert trade_off("ab", matrix, ANY, RIG) is not None
-    assert trade_off("ab", matrix, ANY, RIG, 0.98) is None
+    assert trade_off("ab", matrix * [[1.0, 0.9], [0.9, 1.0]], ANY, RIG) is None
     assert trade_off("ab", matrix * [[1.0, 0.0], [0.0, 0.0]], ANY, RIG) is None
     assert trade_off("a", matrix[:1, :1], ANY, RIG) is None
     assert trade_off("", np.zeros((0, 0)), ANY, RIG) is None

@@ -11,6 +11,7 @@ from identification import identify
 from identification.campaign.random_effects import UsualWidths
 from identification.campaign.run_scatter import ratio_limit
 from identification.estimate import Estimate
+from identification.policy import DIFFERENCE_RATE
 from identification.printing import repeatability_lines
 from identification.statistics import student_factor
 from tests.reference.free_decays import Setting, Truth, campaign
@@ -42,11 +43,11 @@ def test_the_usual_widths_are_those_of_the_vocabulary():
 
 @pytest.mark.parametrize("widths", [1, 2, 3])
 def test_the_ratio_is_exceeded_at_its_rate_by_the_mixture_at_the_end_of_the_range(widths):
-    limit = ratio_limit(widths, 0.01)
+    limit = ratio_limit(widths)
     fewer = chi2.sf(limit, widths - 1) if widths > 1 else 0.0
-    assert 0.5 * (fewer + chi2.sf(limit, widths)) == pytest.approx(0.01, rel=1e-4)
+    assert 0.5 * (fewer + chi2.sf(limit, widths)) == pytest.approx(DIFFERENCE_RATE, rel=1e-4)
     if widths == 1:  # half of the runs that repeat show a width of zero
-        assert limit == pytest.approx(chi2.isf(0.02, 1), rel=1e-4)
+        assert limit == pytest.approx(chi2.isf(2.0 * DIFFERENCE_RATE, 1), rel=1e-4)
 
 
 def test_students_factor_has_the_degrees_of_freedom_of_the_variance():

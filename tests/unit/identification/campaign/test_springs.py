@@ -49,7 +49,7 @@ def test_false_alarm_rate_holds(count):
     alarms = sum(
         any(
             fit_springs(
-                0.1 * SQUARED[:count] * (1.0 + 0.03 * rng.standard_normal(count)), FREQUENCY[:count], rng=rng
+                0.1 * SQUARED[:count] * (1.0 + 0.03 * rng.standard_normal(count)), FREQUENCY[:count]
             ).flagged
         )
         for _ in range(trials)
