@@ -354,7 +354,7 @@ class _Skipping:
         return np.asarray(values - self.basis @ (self.basis.T @ values), np.float64)
 
 
-def _after(values: np.ndarray, factor: complex = 1.0) -> np.ndarray:
+def _after(values: np.ndarray, factor: complex) -> np.ndarray:
     """Sums from each block to the last, each later block multiplied by one more power of a factor."""
     if factor == 1.0:
         return np.cumsum(values[::-1], axis=0)[::-1]

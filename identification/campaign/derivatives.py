@@ -306,7 +306,7 @@ def design_statuses(design: Design, parameters: Array) -> set[Status]:
 
 
 def wind_off(
-    estimates: Sequence[RunEstimate], runs: Sequence[Run], repeatability: RunScatter | None = None
+    estimates: Sequence[RunEstimate], runs: Sequence[Run], repeatability: RunScatter | None
 ) -> dict[str, Any]:
     """Izz and intercept of the line of Kr against ωn² of the wind-off runs (paper, eq. 1).
 

@@ -150,7 +150,7 @@ def posterior_of(
     start: Decay,
     covariance: Array,
     knowledge: NoiseKnowledge,
-    forced: InputResponse | None = None,
+    forced: InputResponse | None,
 ) -> DecayPosterior | None:
     """Compute the posterior on a grid, and move the grid until it covers the posterior.
 

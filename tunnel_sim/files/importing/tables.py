@@ -94,7 +94,7 @@ class Table:
 
     Args:
         part: sheet, group, structure or run in the file; empty if the file contains one table.
-        facts: single numbers beside the columns, by name.
+        facts: single numbers beside the columns, by name; NaN for a name with several numbers.
         remarks: how the table was read, and what was omitted.
         headed: whether the columns are named in the file.
         named: whether the part is the file's name for a run, which is then completely in the table.
