@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from identification.policy import LEAST_SAMPLES
-from identification.signal.decay_fit import mean_of_blocks
+from identification.signal.decay_fit import Reading, block_means
 from identification.signal.frequency import starting_decay
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -178,10 +177,8 @@ def find_windows(record: Record, noise_std: float) -> tuple[tuple[ThreeCycles, .
     if rough is None or rough.omega_d == 0.0:
         return (), 0.0
     period = 2.0 * np.pi / rough.omega_d
-    samples = record.time_s.size
-    block = max(1, int(min(period / record.sample_interval / _SAMPLES_PER_CYCLE, samples / LEAST_SAMPLES)))
-    time = mean_of_blocks(record.time_s - record.time_s[0], block)
-    yaw = mean_of_blocks(record.yaw_rad, block)
+    reading, block = block_means(Reading.from_record(record), 1.0 / period, _SAMPLES_PER_CYCLE)
+    time, yaw = reading.time, reading.yaw
     spline = CubicSpline(time, yaw)
     trace = _Trace(time, yaw, spline, spline.antiderivative(), noise_std / np.sqrt(block))
     # First crossings of the smoothed reading through the mean level of its later half, with hysteresis.
