@@ -37,7 +37,7 @@ from diagnosis.search.process_noise import (
 from diagnosis.search.random_spectra import SOURCES, MomentSource
 from diagnosis.search.runs_in_view import RunsInView
 from diagnosis.search.scatter import differing, with_likeliest_widths, without_deviations
-from diagnosis.search.steady_noise import is_a_line, is_slow, is_steady_noise
+from diagnosis.search.steady_noise import is_a_line, is_slow, is_steady_noise, most_absorbed
 from diagnosis.search.weights import FittedSet, log_weight
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.capabilities import AtRandom
@@ -56,11 +56,6 @@ NO_NOISE_SHARE: Final = 0.9
 Judgement. At most a tenth of the residual then differs from run to run."""
 LAW_STDS: Final = 2.0
 """Margin over that share, in its scatter, in standard deviations. Convention."""
-INFLATED_FROM: Final = 4.0
-"""Ratio of the residual of a set fitted beside a random moment to the least residual of the set, above which there
-is no moment. Judgement. With a drawn moment it is 1.0 to 2.8, in 14 campaigns of the reference simulator and in 28
-fits to exact linear responses. With a false one, estimated from the error of a form, it was 8."""
-
 _ROUNDS = 3  # of estimating the random moment from the residuals, and the effects beside it
 
 
@@ -274,22 +269,25 @@ def _is_random(process: ProcessNoise, source: MomentSource, fitted: Fit) -> bool
         return False
     if follows_the_motion(fitted, process.runs) or obeys_a_law(fitted, source):
         return False
-    return not is_inflated(fitted)
+    return not is_inflated(process, fitted)
 
 
-def is_inflated(fitted: Fit) -> bool:
+def is_inflated(process: ProcessNoise, fitted: Fit) -> bool:
     """Whether the residual of a set beside a random moment is far above the least residual of the set.
 
-    Least squares follow a random motion in part, so their residual is smaller, but not by much. A noise that is
-    estimated from an error of the model permits a larger error, and is estimated from it again. Residuals below
-    twice the noise power are too small to tell.
+    Least squares follow a random motion in part, so their residual is smaller, but not by more than chance. A noise
+    that is estimated from an error of the model permits a larger error, and is estimated from it again. Residuals
+    below twice the noise power are too small to tell.
 
     Args:
-        fitted: a set at its best point beside a moment, with the sensor's noise alone.
+        process: the moment in the residual.
+        fitted: a set at its best point beside the moment, with the sensor's noise alone.
     """
     least = try_fit(fitted.problem, fitted.point)
-    excess = fitted.total - fitted.count
-    return least is not None and excess > INFLATED_FROM * max(least.total - least.count, least.count)
+    if least is None:
+        return False
+    excess, floor = fitted.total - fitted.count, max(least.total - least.count, least.count)
+    return excess > floor and excess > most_absorbed(process, least) * floor
 
 
 def _shown_apart(

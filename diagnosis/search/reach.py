@@ -41,7 +41,7 @@ def unexplained_floor(
     able = may_scatter(between_runs, base.problem.data)
     problem, point = with_deviations(base.problem, base.point, tuple(usual(base, kind) for kind in able))
     jacobian = sensitivities(problem, point, base.jacobian)
-    bases = [_orthonormal(own) for _, own in jacobian]
+    bases = [orthonormal(own) for _, own in jacobian]
 
     def beside(change: Sequence[Array]) -> Array:
         """A change of all runs, concatenated; the runs' parameters are projected out."""
@@ -67,7 +67,8 @@ def _closed_by_own_numbers(base: Fit, kind: type[Effect]) -> float:
     return max((start.predicted_drop for start in starting_points(base, kind)), default=0.0)
 
 
-def _orthonormal(columns: Array) -> Array:
+def orthonormal(columns: Array) -> Array:
+    """An orthonormal basis of columns of any rank, shape (n, rank)."""
     size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     vectors, values, _ = np.linalg.svd(columns / size, full_matrices=False)
     return np.asarray(vectors[:, values > _NULL * values[0]], np.float64)

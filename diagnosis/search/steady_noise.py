@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
@@ -12,8 +13,9 @@ from scipy.special import chdtri
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import residual_spectra
 from diagnosis.likelihood.sensitivities import sensitivities
-from diagnosis.search.process_noise import ProcessNoise, acts_by, likeliest, random_moments
+from diagnosis.search.process_noise import ProcessNoise, acts_by, likeliest, random_moments, with_response
 from diagnosis.search.random_spectra import MomentSource
+from diagnosis.search.reach import orthonormal
 from diagnosis.search.scatter import with_own_linear_terms
 from diagnosis.settings import RandomMomentSettings
 from tunnel_sim.effects import Effect
@@ -44,6 +46,11 @@ OWN_TERMS_SHARE: Final = 0.9
 above which it is none. Judgement. A straight line leaves 0.4 of a random walk; of seven drawn moments of the
 surroundings it is 0.64 at most."""
 
+ABSORBED_RATE: Final = 0.01
+"""Rate at which the power of a random motion, over the power that a fit leaves of it, exceeds its limit.
+Convention."""
+
+_SIMULATED = 200  # campaigns of a random motion
 _ABSORBED = 1e-9  # least singular value of the columns of a run, relative to the largest
 _LINE_WIDTHS = 3.0  # about the centre of a spectrum in which a line is sought
 
@@ -170,3 +177,38 @@ def _drop_beside(own: Sequence[Array], fit: Fit, source: MomentSource) -> float:
         quick.append(residual - slow @ (slow.T @ residual))
     left = likeliest(random_moments(replace(fit, residuals=quick), source), fit.settings.moment)
     return 0.0 if left is None else left.drop
+
+
+def most_absorbed(process: ProcessNoise, fitted: Fit) -> float:
+    """Greatest power of a random motion by chance, as a multiple of the power that a fit leaves of it."""
+    return float(np.quantile(absorption(process, fitted), 1.0 - ABSORBED_RATE))
+
+
+def absorption(process: ProcessNoise, fitted: Fit) -> Array:
+    """Power of a random motion over the power that a fit leaves of it, by linear theory.
+
+    Args:
+        process: the moment; its motion begins at rest in every run in which it acts.
+        fitted: the fit, which absorbs the motion by its common parameters and by the parameters of each run.
+
+    Returns:
+        Ratios of simulated campaigns, shape (campaigns,); 1 where the moment's filter does not settle.
+    """
+    noisy = with_response(fitted, process.spectrum)
+    if noisy is None:
+        return np.ones(1)
+    rng = np.random.default_rng([zlib.crc32(run.reading.tobytes()) for run in noisy.runs])
+    motion, beside, columns = [], [], []
+    for run, shaken, (common, own) in zip(fitted.problem.data.runs, noisy.runs, fitted.jacobian, strict=True):
+        moved = np.zeros((run.reading.size, _SIMULATED))
+        if run.id in process.runs:
+            white = rng.standard_normal(moved.shape).T * shaken.noise.scale
+            moved = np.stack([run.scaled(shaken.noise.coloured(one)) for one in white], axis=1)
+        absorbed = orthonormal(own)
+        motion.append(moved)
+        beside.append(moved - absorbed @ (absorbed.T @ moved))
+        columns.append(common - absorbed @ (absorbed.T @ common))
+    absorbed, moved = orthonormal(np.concatenate(columns)), np.concatenate(beside)
+    left = moved - absorbed @ (absorbed.T @ moved)
+    whole: Array = np.sum(np.concatenate(motion) ** 2, axis=0) / np.sum(left**2, axis=0)
+    return whole

@@ -19,16 +19,9 @@ from diagnosis.model.fact import Fact
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.process_noise import ProcessNoise, with_response
 from diagnosis.search.resolved import unresolved
+from diagnosis.search.steady_noise import most_absorbed
 from tunnel_sim.vocabulary.record import Array
 
-EXPLAINS_MOST: Final = 1.5
-"""Maximum drop of −2 ln L by a random moment, as a multiple of the nominal model's χ² beyond noise in the same
-runs. Judgement. The release of a run absorbs a part of a random motion, and the nominal model as much as it
-can; a half is allowed for both."""
-EXPLAINS_ALONE: Final = 3.0
-"""This limit for a random moment without effects. Judgement. The nominal model and the releases may absorb two
-thirds of a random motion of few cycles. In two campaigns where only a moment acts the drop is 1.54 and 1.61; no
-campaign shows where the limit fails."""
 EXPLAINS_STDS: Final = 4.0
 """Margin of χ² over that maximum due to noise, in standard deviations. Convention. One campaign in 30,000."""
 
@@ -53,7 +46,7 @@ def refusal(answer: Hypothesis, repeating: Fit) -> Fact | None:
     whole: Fit | None = answer.fit
     if answer.moment is not None:
         kinds, process = answer.moment.kinds, answer.moment.process
-        if explains_too_much(process, repeating, alone=not answer.effects):
+        if explains_too_much(process, repeating):
             return Fact("explains too much", {"effects": tuple(kind.name for kind in kinds)})
         whole = _beside(answer, process)
     if whole is None:
@@ -77,12 +70,11 @@ def _beside(answer: Hypothesis, process: ProcessNoise) -> Fit | None:
         return None
 
 
-def explains_too_much(process: ProcessNoise, repeating: Fit, *, alone: bool = False) -> bool:
+def explains_too_much(process: ProcessNoise, repeating: Fit) -> bool:
     """Whether a random moment explains more than the gap of the nominal model in the runs in which it acts.
 
-    If it does, the effects beside it fit these runs worse than the nominal model, and the moment compensates. A
-    moment alone has no effects to compensate; it exceeds the gap only by the random motion that the nominal
-    model absorbs.
+    If it does, the effects beside it fit these runs worse than the nominal model, and the moment compensates. The
+    nominal model and the releases absorb a part of a random motion, so some excess is due to chance.
     """
     left, freedom = 0.0, 0
     for run, residual in zip(repeating.problem.data.runs, repeating.residuals, strict=True):
@@ -90,8 +82,7 @@ def explains_too_much(process: ProcessNoise, repeating: Fit, *, alone: bool = Fa
             left += float(residual @ residual) - residual.size
             freedom += residual.size
     margin = EXPLAINS_STDS * float(np.sqrt(2.0 * freedom))
-    most = EXPLAINS_ALONE if alone else EXPLAINS_MOST
-    return process.drop > most * max(left, 0.0) + margin
+    return process.drop > most_absorbed(process, repeating) * max(left, 0.0) + margin
 
 
 def contradicted(whole: Fit) -> dict[str, str]:

@@ -12,6 +12,7 @@ from diagnosis.likelihood.starting_points import project_out, starting_points
 from diagnosis.model.parameters import Point
 from diagnosis.search.evident import overdispersion
 from diagnosis.search.random_moments import follows_the_motion, is_inflated
+from tests.support.drawn_moment import moment
 from tests.support.gap_campaigns import CONDITIONS, campaign, nominal
 from tunnel_sim.effects import effect_class, effect_from
 
@@ -100,7 +101,7 @@ def test_a_noise_that_permits_a_large_error_of_the_model_is_no_moment(fitted, ex
     far = away * np.sqrt(excess * fitted.count / (near.total - fitted.total))
     beside = fit_at(fitted.problem, Point(common + far, fitted.point.per_run))
     assert (beside.total - fitted.total) / fitted.count == pytest.approx(excess, rel=0.2)
-    assert is_inflated(beside) == inflated
+    assert is_inflated(moment(1.0), beside) == inflated
 
 
 @pytest.mark.parametrize(

@@ -9,16 +9,31 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
+from scipy.stats import binom
 
 from diagnosis.likelihood.least_squares import Fit, fit
 from diagnosis.likelihood.without_run import WithoutRuns, refitted_without
 from diagnosis.model.parameters import Point
 from diagnosis.search.hypothesis import Hypothesis
-from diagnosis.search.process_noise import MomentLayer, ProcessNoise
+from diagnosis.search.process_noise import MomentLayer
 from diagnosis.search.sets import Sets, resolved
+from diagnosis.search.steady_noise import absorption, most_absorbed
 from diagnosis.search.surviving import contradicted, explains_too_much, refusal, shown_by_one
 from diagnosis.search.weights import FittedSet
-from tests.support.gap_campaigns import campaign, nominal, whole_runs
+from tests.reference.linear_rig import response
+from tests.support.drawn_moment import SHAKEN, moment
+from tests.support.gap_campaigns import (
+    CN_BETA,
+    CN_R,
+    CONDITIONS,
+    DAMPING,
+    INERTIA,
+    INTERVAL,
+    campaign,
+    nominal,
+    whole_runs,
+)
 from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.vocabulary.campaign import Campaign
 
@@ -84,23 +99,40 @@ def test_an_effect_that_the_others_cannot_show_is_not_contradicted() -> None:
     assert shown_by_one(found) == {"cubic_stiffness": "r3"}
 
 
-def moment(drop: float) -> ProcessNoise:
-    """A random moment of the six runs that lowers −2 ln L by so much."""
-    names = tuple(f"r{i}" for i in range(1, 7))
-    return ProcessNoise((), names, np.full(6, drop / 6.0), np.ones(6), 0.0, 0.0, [], 0.01, np.ones(3), 0.0)
-
-
 def test_a_random_moment_explains_no_more_than_is_missing() -> None:
     base = nominal(campaign(CUBIC, duration=6.0))
     left = base.total - base.count
-    assert not explains_too_much(moment(1.2 * left), base)
-    assert explains_too_much(moment(3.0 * left), base)
-    # a motion of few cycles is absorbed in part, and a moment alone pays for nothing else
-    assert not explains_too_much(moment(1.7 * left), base, alone=True)
-    assert explains_too_much(moment(4.0 * left), base, alone=True)
+    most = most_absorbed(moment(left), base)
+    assert most > 1.5  # a motion of few cycles is absorbed in part
+    assert not explains_too_much(moment(0.95 * most * left), base)
+    assert explains_too_much(moment(1.2 * most * left), base)
     # where nothing is missing, chance alone is allowed
     none = nominal(campaign(duration=6.0))
     assert not explains_too_much(moment(100.0), none)
+
+
+def test_as_much_of_a_random_motion_is_absorbed_as_is_foreseen() -> None:
+    """Truth: fits to exact responses of the linear rig, whose stiffness and damping are fitted as well."""
+    clean, rng = campaign(duration=6.0), np.random.default_rng(21)
+    before, keep = nominal(clean), np.exp(-2.0 * np.pi * SHAKEN.bandwidth * INTERVAL)
+    ratios = []
+    for _ in range(20):
+        runs = []
+        for run, (spring, speed) in zip(clean.runs, CONDITIONS, strict=True):
+            white = SHAKEN.intensity * np.sqrt(1.0 - keep**2) * rng.standard_normal(run.record.time_s.size)
+            per_speed = 0.5 * 1.2 * speed * 0.036 * 0.625
+            rig = INERTIA, DAMPING - per_speed * 0.625 * CN_R, spring - per_speed * speed * CN_BETA
+            moved = response(lfilter([1.0], [1.0, -keep], white), INTERVAL, *rig)
+            runs.append(replace(run, record=replace(run.record, yaw_rad=run.record.yaw_rad + moved)))
+        after = nominal(replace(clean, runs=tuple(runs)))
+        pairs = zip(before.problem.data.runs, after.problem.data.runs, strict=True)
+        whole = sum(float(np.sum(one.scaled(other.reading - one.reading) ** 2)) for one, other in pairs)
+        ratios.append(whole / (after.total - after.count))
+    foreseen = absorption(moment(1.0), before)
+    assert np.quantile(foreseen, 0.2) < np.median(ratios) < np.quantile(foreseen, 0.8)
+    # one in a thousand of each is beyond a limit that one in a hundred passes
+    assert np.sum(ratios > np.quantile(foreseen, 0.99)) <= binom.isf(1e-3, len(ratios), 0.01)
+    assert np.sum(ratios < np.quantile(foreseen, 0.01)) <= binom.isf(1e-3, len(ratios), 0.01)
 
 
 def test_a_set_with_a_random_moment_is_judged_as_others_are() -> None:
