@@ -423,7 +423,7 @@ class NominalModel:
         common = [one for one in self.parameters(data) if one.owner == "common" and one.name != "zero"]
         if len(data.runs) == 1:
             found.append("how well runs repeat: a single run shows no scatter between runs")
-        elif _OF_A_DECAY * len(data.runs) <= len(common) and not data.driven:
+        elif _OF_A_DECAY * len(data.runs) <= len(common) and not (data.driven or data.repeatability):
             found.append(
                 "how well runs repeat: no two runs can be compared, and ± assumes runs that repeat exactly"
             )

@@ -86,8 +86,10 @@ def as_stated(fitted: Fit, kinds: Sequence[type[Effect]]) -> Fit:
         fitted: a fit to runs that repeat exactly.
         kinds: the effects that may be named.
     """
-    known = fitted.problem.data.repeatability
-    stated = [kind for kind in may_scatter(kinds, fitted.problem.data) if known.get(kind.scatters, 0.0) > 0.0]
+    data = fitted.problem.data
+    acting = (kind for kind in data.model.may_scatter(kinds) if data.acts(kind).any())
+    known = data.repeatability  # stated, and so known of two runs or one, which would not show it
+    stated = [kind for kind in acting if known.get(kind.scatters, 0.0) > 0.0]
     if not stated:
         return fitted
     scatter = tuple(chance(fitted, kind, known[kind.scatters]) for kind in stated)
