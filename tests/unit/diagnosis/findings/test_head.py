@@ -275,7 +275,19 @@ def test_the_head_calls_no_coefficient_unchanged_that_the_first_step_corrects() 
     given["coefficients"]["after"]["cn_beta"]["interval"] = [0.36, 0.49]
     head = Head.of(findings_of(given))
     assert "Cnβ" not in head.first
-    assert "Cnβ 0.432 (0.360 to 0.490), unchanged" in head.costs
+    assert "Cnβ 0.432 (0.360 to 0.490) instead of 0.478 (within the interval)" in head.costs
+
+
+@pytest.mark.parametrize(("after", "said", "costs"), [
+    (0.4762, "Cnβ changes by less than 1 %", "unchanged"), (0.4747, "Cnβ falls by 0.69 %", "instead of 0.4780"),
+])  # fmt: skip
+def test_a_small_change_is_stated_alike_in_head_and_verdict(after: float, said: str, costs: str) -> None:
+    given = two_causes()
+    given["coefficients"]["before"]["cn_beta"]["value"] = 0.478
+    given["coefficients"]["after"]["cn_beta"] |= {"value": after, "std": 0.0001}
+    answer = findings_of(given)
+    assert said in consequence(answer)
+    assert f"{costs};" in Head.of(answer).costs.partition("Cnr")[0]
 
 
 def test_the_head_and_the_verdict_state_one_change_by_the_gap_that_remains() -> None:
