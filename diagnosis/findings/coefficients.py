@@ -143,7 +143,7 @@ SOURCES = {
     "misfit": "model error",
     "small causes": "small causes that are not named",
     "air density": "rounding of the stated air density",
-    "unseen form": "form of the cause that free decays cannot show",
+    "unseen form": "form of the cause that these runs cannot show",
     "freed form": "freedom of the causes' forms",
     "rivals": "other answers, weighted by probability",
 }

@@ -43,6 +43,7 @@ ONE_WIND: Final = 0.02
 gap belongs to the larger. Judgement."""
 
 _WIND = "whether it needs wind cannot be determined"
+_WIND_OFF = "wind-off runs show it"
 
 
 def _alone(given: Mapping[str, Any]) -> str:
@@ -58,7 +59,7 @@ REASONS: Mapping[str, str | Callable[[Mapping[str, Any]], str]] = {
     "no single run": f"{_WIND}, since no single run shows it",
     "one run": f"{_WIND} from one run alone ({{run}})",
     "wind-off runs not fitted": f"{_WIND}, since the wind-off runs could not be fitted alone",
-    "wind-off runs show it": lambda given: f"{_alone(given)} it too",
+    _WIND_OFF: lambda given: f"{_alone(given)} it too",
     "wind-off runs show none": lambda given: f"{_alone(given)} no gap",
     "blow": "most of the missing moment acts between {from_s:.1f} and {to_s:.1f} s",
     "spectral line": "it is a spectral line near {frequency_hz:.3g} Hz",
@@ -103,20 +104,24 @@ def where_words(where: Where, place: PlaceFound | Nowhere | None, judged: Judged
     acts = f"It acts on {words}" if words else "The residuals alone do not show what it acts on"
     if words and place.compared and (place.alike or not (place.agrees or place.elsewhere)):
         acts = f"It looks like a change of {words}"  # the causes produce the same pattern
+    agreement = _agreement(where, place)
     between = place.channel.kind in BETWEEN_RUNS and bool(scattering(judged.causes))
     if between:
-        acts, channel = "Most of it is between the runs", "each run alone is linear"
+        acts, channel, agreement = "Most of it is between the runs", "each run alone is linear", ""
     if where.condition is None:
         parts.append(f"{acts}: {channel}; {condition}.")
     else:
         parts.append(f"{acts}: {channel}.")
         if place.wind:  # runs with wind and without it are needed to state the condition
             conditions = {effect_class(name).condition for name in place.compared}
-            if conditions and where.condition not in conditions:  # the causes act in other runs, too
-                parts.append(f"{condition[:1].upper()}{condition[1:]}.")
+            if conditions and where.condition not in conditions:  # the causes act in other runs
+                if place.condition.kind == _WIND_OFF:  # a gap of their own
+                    condition = f"{_alone(place.condition.figures)} a gap too"
+                parts += [agreement, f"{condition[:1].upper()}{condition[1:]}."]
+                agreement = ""
             else:
                 parts.append(f"It appears {CONDITIONS[where.condition]}: {condition}.")
-    return " ".join(filter(None, (*parts, "" if between else _agreement(where, place))))
+    return " ".join(filter(None, (*parts, agreement)))
 
 
 def _nowhere(found: Nowhere) -> str:

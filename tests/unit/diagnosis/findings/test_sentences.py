@@ -64,6 +64,14 @@ def test_the_runs_that_show_the_gap(given: Document) -> None:
     assert placed(given).startswith("No single run is beyond chance (false-alarm rate 1 % over all runs)")
 
 
+def test_a_gap_of_the_wind_off_runs_is_not_that_of_a_cause_that_needs_wind(given: Document) -> None:
+    text = placed(given, compared=["nonlinear_yaw_damping"])
+    assert text.endswith(
+        "That agrees with nonlinear yaw damping. The 2 wind-off runs, fitted alone, show a gap too."
+    )
+    assert "It appears" not in text
+
+
 def test_only_what_locates_the_gap_is_said(given: Document) -> None:
     assert "of the gap lie at 1.88 to 2.62 Hz." in placed(given, narrow=["frequency_hz"])
     text = placed(given, narrow=[], bands={})
@@ -151,6 +159,7 @@ def test_caveats_state_their_figures() -> None:
     assert "A fault of this run cannot be told from a cause." in few(1)
     assert "fault" not in few(2)
     assert few(2, windy=True).endswith("springs, wind speeds and release angles.")
+    assert few(2, windy=True, driven=True).endswith("springs, wind speeds and inputs.")
     assert few(2, driven=True).endswith(
         "form of the motion alone distinguishes causes. Add runs with other inputs."
     )
