@@ -10,7 +10,7 @@ from diagnosis.findings.coefficients import UNCERTAIN_FROM
 from diagnosis.findings.disturbed_runs import disturbed_step
 from diagnosis.findings.finding import NextStep
 from diagnosis.findings.input_hold import hold_steps
-from diagnosis.findings.next_run import OTHER_INPUT, NextRun, source_of_width
+from diagnosis.findings.next_run import OTHER_INPUT, OTHER_SPEED, NextRun, source_of_width
 from diagnosis.findings.patch import model_steps
 from diagnosis.findings.place import runs_of_the_gap
 from diagnosis.findings.repeatability import width_text
@@ -84,7 +84,9 @@ def _mending(answer: Findings) -> Iterator[NextStep]:
     names = [name for name in answer.causes if name not in of_spring or not answer.found.choices]
     found = []
     for name in (name for name in names if name in certain or name in SCATTERS):
-        step = NextStep(answer.named_causes.advice(name), _gain(answer, name, parts))
+        step = answer.repeated.pattern_step(name) or NextStep(
+            answer.named_causes.advice(name), _gain(answer, name, parts)
+        )
         found.append((name in SCATTERS, _part(parts, [name]), step))
     open_ones = [name for name in answer.causes if name not in certain and name not in SCATTERS]
     told_apart = open_ones or [name for name in answer.causes if name not in names] or names
@@ -180,6 +182,7 @@ def rival_lines(answer: Findings) -> list[str]:
     decided = answer.decided
     rivals, run = answer.ambiguous_with if decided else (), answer.next_run
     lines = []
+    certain = answer.named_causes.certain_and_open()[0] if rivals else answer.causes
     if rivals:
         lines.append(f"These runs cannot distinguish it from {' or '.join(map(plain, rivals))}.")
     if run is not None and run_to_make(answer) is None:
@@ -192,7 +195,9 @@ def rival_lines(answer: Findings) -> list[str]:
         )
         lines.append(f"{which}: {run.words(answer.freedom, robot=answer.found.robot)}.")
     elif rivals and answer.found.driven:
-        lines.append(f"To distinguish them, {OTHER_INPUT}.")
+        open_ones = {*answer.causes, *rivals} - set(certain)
+        apart = {kind.condition for kind in known_effects() if kind.name in open_ones}
+        lines.append(f"To distinguish them, {OTHER_INPUT if apart != {'wind_on'} else OTHER_SPEED}.")
     elif rivals and unplannable(answer):
         lines.append(
             "A run that would distinguish them cannot be computed: state every spring_stiffness, or add runs."

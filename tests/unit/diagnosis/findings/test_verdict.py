@@ -471,6 +471,23 @@ def test_what_to_do_about_runs_is_said_once() -> None:
     assert not any("cut it by hand" in step for step in steps)  # the run is used as it is cut
 
 
+def test_effects_that_the_wind_speed_separates_are_separated_by_another_speed():
+    one = answer_of("reynolds_dependence", driven=True) | {
+        "next_run": None,
+        "ambiguous_with": ["wind_speed_offset"],
+    }
+    one["candidates"] = [
+        {"effect": name, "probability": value, "parameters": {}}
+        for name, value in (("reynolds_dependence", 0.6), ("wind_speed_offset", 0.4))
+    ]
+    assert rival_lines(findings_of(one))[-1].startswith(
+        "To distinguish them, record a run at another wind speed"
+    )
+    one["candidates"][0]["effect"] = "cubic_stiffness"
+    other = one | {"causes": ["cubic_stiffness"]}
+    assert "another wind speed" not in rival_lines(findings_of(other))[-1]
+
+
 OF_A_TUNNEL = ("spring", "wind", "potentiometer", "turbulence", "rod", "level the axis", "draught")
 
 
