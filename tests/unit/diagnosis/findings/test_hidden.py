@@ -181,7 +181,7 @@ def test_a_refit_in_another_minimum_confirms_no_limit(monkeypatch):
     base, limited = found_beside(campaign(), name)
     held, tried = hidden._held, []
 
-    def refit(fit, start, size, near):
+    def refit(fit, start, size, _):
         again = held(fit, start, 0.5 * size, None)
         tried.append(abs(size))
         worse = 4e3 if abs(size) > tried[0] else 0.0
