@@ -249,11 +249,9 @@ def _look(answer: Findings) -> NextStep:
     named = f", in {listed(list(runs))}" if place is not None and 0 < len(runs) < min(place.runs, 6) else ""
     what = "the rig" if channel is None else f"what acts on {CHANNELS[channel]}"
     wind = f" {CONDITIONS['wind_on']}" if answer.where.condition == "wind_on" else ""
-    size = answer.misfit.words(answer.gap.excess_before)
-    return NextStep(
-        f"Examine {what}{wind}{named}, where the model departs from the runs",
-        f"the cause makes a misfit of {size}",
-    )
+    misfit, excess = answer.misfit, answer.gap.excess_before
+    size = f"the cause makes a misfit of {misfit.words(excess)}" if misfit.shows(excess) else ""
+    return NextStep(f"Examine {what}{wind}{named}, where the model departs from the runs", size)
 
 
 # ---- runs, the model and intervals
@@ -280,8 +278,8 @@ def _narrowing(answer: Findings) -> Iterator[NextStep]:
             part = _CUT.get(source, 1.0)
             if source == "noise" and runs is not None:
                 part = 1.0 - runs.left.get(name, 1.0) ** 2
-            if part > 0.0:
-                found.setdefault(source, []).append(_becomes(name, one, part * one.shares[source]))
+            if part > 0.0 and (becomes := _becomes(name, one, part * one.shares[source])):
+                found.setdefault(source, []).append(becomes)
     for source, gains in found.items():
         what = _NARROWS[source].format(other="inputs" if answer.found.driven else "release angles")
         if source == "noise" and runs is not None:
@@ -308,14 +306,19 @@ def _narrower(answer: Findings) -> str:
     most = max(after, key=lambda name: after[name].shares.get("rivals", 0.0), default="")
     if not most or after[most].shares.get("rivals", 0.0) < _GAINS:
         return ""
-    return f"; {_becomes(most, after[most], after[most].shares['rivals'])}"
+    becomes = _becomes(most, after[most], after[most].shares["rivals"])
+    return f"; {becomes}" if becomes else ""
 
 
 _GAINS = 0.55  # share of a variance: without it the standard deviation falls by a third
 
 
 def _becomes(name: str, given: Quantity, part: float) -> str:
-    """The interval of a coefficient without a part of its variance, such as ``Cnr becomes ± 5 % (now ± 12 %)``."""
+    """The interval of a coefficient without a part of its variance, such as ``Cnr becomes ± 5 % (now ± 12 %)``.
+
+    Empty where both are shown alike.
+    """
     now = given.reach / abs(given.value)
     left = now * math.sqrt(max(1.0 - part, 0.0))
-    return f"{COEFFICIENTS.get(name, name)} becomes {within(left)} (now {within(now)})"
+    before, after = within(now), within(left)
+    return "" if before == after else f"{COEFFICIENTS.get(name, name)} becomes {after} (now {before})"

@@ -216,6 +216,8 @@ def test_a_wide_interval_has_a_step_that_narrows_it(source: str, step: str, left
         (found,) = (one for one in next_steps(findings_of(given)) if "becomes" in one)
         assert found.startswith("Make 2 more runs: spring of 16.12 N m/rad, wind at 35 m/s, release at 20°")
         assert_shows(found.partition(": Cnr becomes ")[2], [0.3 * now, now])
+        given["further_runs"] = runs | {"count": 2, "left": {"cn_r": 0.9999}}
+        assert not any("becomes" in one for one in next_steps(findings_of(given)))  # ± 39 % now and then
     wide["std"] = 0.003
     assert not any(one.startswith(step) for one in next_steps(findings_of(given)))
 

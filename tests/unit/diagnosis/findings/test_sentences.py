@@ -284,6 +284,10 @@ def test_what_could_be_closed(given: Document) -> None:
     assert text(kind="time", ceilings=timed).startswith(
         "A moment in time, equal in all runs, could explain 85.0"
     )
+    between = [CEILINGS[0] | {"kind": "between"}]
+    assert text(kind="between", ceilings=between).startswith(
+        "A stiffness, damping or moment of each run could explain 85.0"
+    )
     stated = {"moment": "k*b^n", "parameters": {"k": {"unit": "N m"}, "n": {"unit": "1"}}}
     values = {"k": {"value": -0.2457, "std": 0.0012}, "n": {"value": 3.0, "std": 0.02}}
     law = {"effect": stated, "parameters": values, "closed": 0.8, "std": 0.01}
