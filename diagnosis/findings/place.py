@@ -90,7 +90,7 @@ def where_words(where: Where, place: PlaceFound | Nowhere | None, judged: Judged
     if place is None:
         return ""
     if isinstance(place, Nowhere):
-        return _nowhere(place)
+        return _nowhere(place, judged.settings.where.run_rate)
     parts = [f"{_which_runs(where, place)}."]
     if places := _places(where, place, judged.misfit.unit):
         most = part(judged.settings.where.interval_share).capitalize()
@@ -124,14 +124,20 @@ def where_words(where: Where, place: PlaceFound | Nowhere | None, judged: Judged
     return " ".join(filter(None, (*parts, agreement)))
 
 
-def _nowhere(found: Nowhere) -> str:
-    """The sentence for a campaign without a gap."""
+def _nowhere(found: Nowhere, run_rate: float) -> str:
+    """The sentence for a campaign without a gap.
+
+    Args:
+        run_rate: false-alarm rate of the test of single runs.
+    """
     count = found.runs
     runs = f"Nowhere: in {count} {'run' if count == 1 else 'runs'} the residual is"
     chance = f"p {p_text(found.p_value)} for the run that differs most, corrected for their number"
     if found.within_step:
         return f"{runs} not white noise ({chance}), but within the steps of the readings."
-    return f"{runs} consistent with the noise ({chance})."
+    departs = count > 1 and found.p_value < run_rate  # all runs together show no gap
+    together = " together, though one alone departs from it" if departs else ""
+    return f"{runs} consistent with the noise{together} ({chance})."
 
 
 def _which_runs(where: Where, place: PlaceFound) -> str:
@@ -145,7 +151,8 @@ def _which_runs(where: Where, place: PlaceFound) -> str:
             "runs); the gap shows only in all of them together"
         )
     elif len(runs) == count:
-        text = f"All {count} runs show the gap" if count > 1 else "The run shows the gap"
+        every = "Both" if count == 2 else f"All {count}"
+        text = f"{every} runs show the gap" if count > 1 else "The run shows the gap"
     elif len(runs) == 1:
         text = f"{share} is in one run of {count}{named}"
     else:

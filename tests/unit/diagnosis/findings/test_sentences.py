@@ -72,6 +72,11 @@ def test_a_gap_of_the_wind_off_runs_is_not_that_of_a_cause_that_needs_wind(given
     assert "It appears" not in text
 
 
+def test_two_runs_that_show_the_gap_are_both(given: Document) -> None:
+    given["where"]["runs"] = list(IDS[:2])
+    assert placed(given, runs=2).startswith("Both runs show the gap")
+
+
 def test_only_what_locates_the_gap_is_said(given: Document) -> None:
     assert "of the gap lie at 1.88 to 2.62 Hz." in placed(given, narrow=["frequency_hz"])
     text = placed(given, narrow=[], bands={})
@@ -119,6 +124,8 @@ def test_without_a_gap_it_is_nowhere(given: Document, within_step: bool, end: st
     text = where_words(findings_of(given))
     assert text.startswith("Nowhere: in 3 runs the residual is")
     assert text.endswith(end)
+    given["found"]["nowhere"]["p_value"] = 0.004
+    assert ("though one alone departs from it (p = 0.004" in where_words(findings_of(given))) != within_step
 
 
 FIGURES = {
