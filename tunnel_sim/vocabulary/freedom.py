@@ -406,7 +406,7 @@ DISPLACEMENT = Freedom(
         (r"^swing(?=\n\[)", "motion"),
         (r"nominal Izz of model and support", "of the moving body"),
         (r"optional: wind_speed, spring_stiffness", "optional: spring_stiffness"),
-        (r"bearing and the potentiometer", "guide and the sensor"),
+        (r"bearing and the sensor", "guide and the sensor"),
         (r"(natural frequency of small )swings( \[)rad/s", r"\1motions\g<2>1/s"),
         (r"(ωn\s*\[)rad/s", r"\g<1>1/s"),
         (r"(ωn²\s*\[)rad²/s²", r"\g<1>1/s²"),

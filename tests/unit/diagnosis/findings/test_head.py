@@ -228,7 +228,7 @@ def test_the_only_cause_names_the_changes_of_the_coefficients_as_the_verdict_doe
     given["waterfall"] = [{"effect": None, "excess": 10.0}, {"effect": DRY, "excess": 0.0}]
     first = next_steps(findings_of(given))[0]
     assert first == (
-        "Reduce the dry friction of the bearing and the potentiometer: removes the whole gap and corrects Cnβ by "
+        "Reduce the dry friction of the bearing and the sensor: removes the whole gap and corrects Cnβ by "
         "10 % and Cnr by 20 %."
     )
     verdict = consequence(findings_of(given))

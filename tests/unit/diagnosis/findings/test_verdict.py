@@ -499,7 +499,16 @@ def test_effects_that_the_wind_speed_separates_are_separated_by_another_speed():
     assert "another wind speed" not in rival_lines(findings_of(other))[-1]
 
 
-OF_A_TUNNEL = ("spring", "wind", "potentiometer", "turbulence", "rod", "level the axis", "draught")
+OF_A_TUNNEL = (
+    "spring",
+    "wind",
+    "potentiometer",
+    "bearing and the sensor",
+    "turbulence",
+    "rod",
+    "level the axis",
+    "draught",
+)
 
 
 @pytest.mark.parametrize("driven", [False, True])
