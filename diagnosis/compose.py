@@ -74,6 +74,7 @@ from identification.status import Examined, Remark, left_out_as_asked
 from tunnel_sim.effects import BetweenRuns, effect_class
 from tunnel_sim.effects.capabilities import SecondOscillation
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.freedom import unit_of_frequency
 
 if TYPE_CHECKING:
     from tunnel_sim.engine.joint_model import JointModel
@@ -444,7 +445,7 @@ def _remains(study: Study, after: Mapping[str, Quantity], answers: Answers, step
     similarity, chosen = study.similarity, study.chosen
     stated = own_estimates(after, similarity)
     moved = {
-        name: similarity.own(coefficient_move(chosen, coefficient), given.unit)
+        name: similarity.own(coefficient_move(chosen, coefficient), unit_of_frequency(name, given.unit))
         for (name, given), coefficient in zip(after.items(), coefficients_of(chosen), strict=False)
     }
     return remainder(study, stated, moved, steps.steps[-1].excess, answers.hidden)

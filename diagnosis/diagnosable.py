@@ -21,7 +21,7 @@ from diagnosis.noise.sensor_noise import LEAST_SAMPLES
 from identification.estimate import Status
 from identification.examination.examine import examine, with_clocks
 from identification.examination.self_excited import in_limit_cycle
-from identification.show.numbers import unit_mark
+from identification.show.numbers import unit_mark, with_std
 from identification.signal.known_gain import refuse_other_gains
 from identification.signal.run_fit import NO_WINDOWS, identify_run
 from identification.status import Outcome, Remark
@@ -331,9 +331,9 @@ def gain_words(campaign: Campaign, fit: Fit) -> tuple[str, ...]:
     value, std = fit.value("drive_gain"), fit.std("drive_gain")
     value, std = (data.similarity.own(1.0, unit) ** (-1 if known else 1) * one for one in (value, std))
     if known:
-        return (f"Per N m of the input the angular acceleration is {value:.5g} ± {std:.2g} rad/s².",)
+        return (f"Per N m of the input the angular acceleration is {with_std(value, std)} rad/s².",)
     per = unit_mark(data.model.moment_unit)
-    return (f"The gain of the input is {value:.5g} ± {std:.2g} {per} per unit.",)
+    return (f"The gain of the input is {with_std(value, std)} {per} per unit.",)
 
 
 def refuse_indefinite(fit: Fit) -> None:

@@ -35,6 +35,7 @@ from identification.statistics import density_rounding
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.capabilities import OutOfPhase
 from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.freedom import unit_of_frequency
 from tunnel_sim.vocabulary.record import Array
 
 SKEWED_FROM: Final = 0.1
@@ -297,8 +298,9 @@ def as_identified(
             parts["air density"] = (given.value * density_rounding(campaign.runs)) ** 2
         shares = {source: min(part / given.known_std**2, 1.0) for source, part in parts.items()}
         shares = {"noise": max(1.0 - sum(shares.values()), 0.0), **shares}
-        value, std = (similarity.similar(one, given.unit) for one in (given.value, given.known_std))
-        ends = given.interval and tuple(similarity.similar(end, given.unit) for end in given.interval)
+        unit = unit_of_frequency(name, given.unit)
+        value, std = (similarity.similar(one, unit) for one in (given.value, given.known_std))
+        ends = given.interval and tuple(similarity.similar(end, unit) for end in given.interval)
         interval = (ends[0], ends[1]) if ends else None
         same[name] = Quantity(value, std, given.unit, shares=shares, interval=interval)
     return same

@@ -6,6 +6,7 @@ law is wrong, or one run differs from the others.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -87,6 +88,15 @@ class SizeByRun:
     def agrees(self) -> bool:
         """Whether the runs agree on it within chance."""
         return self.p_value >= AGREE_RATE
+
+    @property
+    def form_std(self) -> float:
+        """Standard deviation of the common size by the differences beyond chance, in its unit; 0 without any."""
+        if self.agrees:
+            return 0.0
+        weights = np.array([size.known_std**-2.0 for size in self.runs.values()])
+        share = self.spread * math.sqrt(float(weights @ weights)) / float(weights.sum())
+        return share * abs(self.common.value)
 
     @property
     def farthest(self) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 
 from diagnosis.answer.held_out import Base
 from diagnosis.answer.linear_theory import move_of_halves, parameter_shift
+from diagnosis.findings.by_run import in_its_noise, sizes
 from diagnosis.findings.closing import Closing
 from diagnosis.findings.finding import Judged, Picture
 from diagnosis.findings.repeatability import RunRepeatability
@@ -268,8 +269,8 @@ def parameter_errors(study: Study, closes: Closing) -> dict[str, float]:
 
     Returns:
         In the parameters' units of the similar campaign. One source is the change by MuJoCo's integrator, where
-        it and the fits' integrator disagree. The other is the difference between halves of the data, where they
-        differ by more than chance because the form of a cause is not exact (`move_of_halves`).
+        it and the fits' integrator disagree. The other is the form of a cause, which is not exact where halves of
+        the data (`move_of_halves`) or single runs (`SizeByRun.form_std`) differ by more than chance in its size.
     """
     fit = study.chosen
     problem = fit.problem
@@ -278,11 +279,14 @@ def parameter_errors(study: Study, closes: Closing) -> dict[str, float]:
     stepped = np.zeros(len(problem.names))
     if not closes.confirmation.agrees and not closes.confirmation.failure:
         stepped = parameter_shift(fit, [closes.shifts[run.id] for run in problem.data.runs])
+    noisy = in_its_noise(study)
+    own = () if noisy is None else sizes(noisy, study.prepared.kinds)
+    by_run = {f"{one.effect}.{one.parameter}": one.form_std for one in own}
     found = {}
     for place, name in enumerate(problem.names):
         if name in problem.effect_names and fit.bound(name) is None:
             halves = move_of_halves(fit, np.eye(len(problem.names))[place])
-            found[name] = math.hypot(float(stepped[place]), halves)
+            found[name] = math.hypot(float(stepped[place]), max(halves, by_run.get(name, 0.0)))
     return found
 
 

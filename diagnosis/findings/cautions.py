@@ -37,7 +37,7 @@ def _few_runs(given: Figures) -> str:
     if given["driven"]:
         motion, others = "motion", "with other inputs"
     if given["windy"]:
-        others = "with other springs, wind speeds and release angles"
+        others = f"with other springs, wind speeds and {'inputs' if given['driven'] else 'release angles'}"
     number = "is one run" if given["runs"] == 1 else f"are {given['runs']} runs"
     told = f"the form of the {motion} alone distinguishes causes"
     fault = " A fault of this run cannot be told from a cause." if given["runs"] == 1 else ""
@@ -117,8 +117,8 @@ CAUTIONS: Mapping[str, Sentence] = {
     "not confirmed": _not_confirmed,
     "few runs": _few_runs,
     "none held out": _none_held_out,
-    "some not held out": "Not held out of the fit, because no other run has the same spring or wind: {runs}. Their "
-    "gap with the causes is the gap of the fit. Repeat these runs.",
+    "some not held out": "Not held out of the fit, because no other run has the same spring or wind: {runs}. There "
+    "the gap with the causes is the gap of the fit. Repeat every such run.",
     "cut": "The nominal model fits poorly, so each record is used only from its second passage through the centre "
     "until its motion ends. A start by hand and a body at rest are not free decays. The coefficients before the "
     "causes may therefore differ from identify's, which uses the whole record.",

@@ -143,7 +143,7 @@ SOURCES = {
     "misfit": "model error",
     "small causes": "small causes that are not named",
     "air density": "rounding of the stated air density",
-    "unseen form": "form of the cause that free decays cannot show",
+    "unseen form": "form of the cause that these runs cannot show",
     "freed form": "freedom of the causes' forms",
     "rivals": "other answers, weighted by probability",
 }
@@ -280,10 +280,11 @@ def consequence(given: Coefficients, judged: Judged) -> str:
         values = _apart(before.value, after.value)
         if before.value * after.value < 0.0:
             clauses.append(f"{COEFFICIENTS.get(name, name)} changes its sign ({values})")
-        elif abs(share) < 0.5:
+        elif abs(after.value - before.value) < UNCHANGED * abs(before.value):
             clauses.append(f"{label} changes by less than 1 %")
         else:
-            clauses.append(f"{label} {'falls' if share < 0.0 else 'rises'} by {abs(share):.0f} % ({values})")
+            size = f"{abs(share):{'.2g' if abs(share) < 0.995 else '.0f'}} %"
+            clauses.append(f"{label} {'falls' if share < 0.0 else 'rises'} by {size} ({values})")
     if not clauses:
         return ""
     text = listed(clauses)
@@ -302,6 +303,9 @@ def _of_the_rate(given: Coefficients) -> str:
     )
 
 
+UNCHANGED: Final = 0.005
+"""Minimum change of a coefficient, as a share of its value without the causes, that is stated with its size.
+Convention. A smaller change rounds to less than 1 %."""
 UNCERTAIN_FROM: Final = 0.5
 """Standard deviation of a coefficient, as a share of its value, above which its change is not stated.
 Convention."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from diagnosis.findings.candidates import Candidate
 from diagnosis.findings.cautions import CAUTIONS, sentence_of
 from diagnosis.findings.closure import shares_of_gap
+from diagnosis.findings.coefficients import UNCHANGED
 from diagnosis.findings.disturbed_runs import odd_runs
 from diagnosis.findings.next_steps import next_steps
 from diagnosis.findings.terms import (
@@ -257,12 +258,10 @@ def _coefficient(one: Quantity, before: Quantity | None) -> str:
     unit = "" if one.unit in ("1", "1/rad") else unit_mark(beside(one.unit))
     if before is None or not before.determined:
         return f"{text}{unit}"
-    if one.agrees(before.value) or abs(before.value - one.value) <= _UNCHANGED * abs(one.value):
+    if abs(one.value - before.value) < UNCHANGED * abs(before.value):
         return f"{text}{unit}, unchanged"
-    return f"{text}{unit} instead of {before.value:.{places}f}"
-
-
-_UNCHANGED = 0.005  # share of a coefficient: a smaller change does not matter to a customer
+    inside = " (within the interval)" if one.agrees(before.value) else ""
+    return f"{text}{unit} instead of {before.value:.{places}f}{inside}"
 
 
 def _further(answer: Findings) -> str:

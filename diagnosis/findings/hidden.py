@@ -143,7 +143,10 @@ def _confirmed(fit: Fit, start: StartingPoint, linear: _Size, reach: float) -> _
         rise = (again.unlikelihood - limit) / reach
         # refits beside chance differences may end in several minima, so the rise may have a step
         within = max((abs(one) for one, root in known if root < 1.0), default=0.0)
-        if abs(rise - 1.0) <= _CONFIRMED or (rise > 1.0 and within < abs(size) < _CLOSE * within):
+        close = rise > 1.0 and within < abs(size) < _CLOSE * within
+        if close and rise > _STEP:  # this refit failed, and its coefficients say nothing
+            return None
+        if close or abs(rise - 1.0) <= _CONFIRMED:
             return replace(
                 linear,
                 size=size,
@@ -216,6 +219,9 @@ _REFITS = 10
 _STEPS = 10  # iterations of a refit, which starts at the fit
 _CONFIRMED = 0.1  # greatest distance of a rise from the limit's rise, as a share of the latter
 _CLOSE = 1.1  # maximum ratio of a size beyond the limit to one within it, for both to confirm the limit
+_STEP = (
+    10.0  # maximum rise just beyond the limit, as a share of the limit's rise: minima of one fit differ less
+)
 _WIDEST = 10.0  # greatest factor between two sizes that are refitted
 _LEAST_RISE = 1e-3  # as a share of the limit's rise
 

@@ -32,6 +32,10 @@ class Misfit:
         """Root mean square misfit in ``unit``; zero for a negative excess, which is chance."""
         return self.noise * math.sqrt(max(excess, 0.0))
 
+    def shows(self, excess: float) -> bool:
+        """Whether a gap shows as a root mean square beyond the noise."""
+        return excess >= _NONE
+
     def of_swing(self, excess: float) -> float | None:
         """The misfit as a share of the swing; None where the readings do not move."""
         return self.rms(excess) / self.swing if self.swing > 0.0 else None
@@ -51,7 +55,7 @@ class Misfit:
         Args:
             times: adds the multiple of the noise variance, such as ``0.134° (19.34)``.
         """
-        if excess < _NONE:
+        if not self.shows(excess):
             return NO_MISFIT
         return f"{self.rms_words(excess)} ({held_out_excess(excess)})" if times else self.rms_words(excess)
 

@@ -246,6 +246,7 @@ def remaining(fit: Fit, runs: list[RunData], angle: float) -> Array:
 
 
 OTHER_INPUT = "record a run with another input, such as half the amplitude or another band of frequencies"
+OTHER_SPEED = "record a run at another wind speed, or with another input"
 
 
 def _step_of_release(similarity: Similarity) -> float:

@@ -10,7 +10,7 @@ from diagnosis.findings.coefficients import UNCERTAIN_FROM
 from diagnosis.findings.disturbed_runs import disturbed_step
 from diagnosis.findings.finding import NextStep
 from diagnosis.findings.input_hold import hold_steps
-from diagnosis.findings.next_run import OTHER_INPUT, NextRun, source_of_width
+from diagnosis.findings.next_run import OTHER_INPUT, OTHER_SPEED, NextRun, source_of_width
 from diagnosis.findings.patch import model_steps
 from diagnosis.findings.place import runs_of_the_gap
 from diagnosis.findings.repeatability import width_text
@@ -84,7 +84,9 @@ def _mending(answer: Findings) -> Iterator[NextStep]:
     names = [name for name in answer.causes if name not in of_spring or not answer.found.choices]
     found = []
     for name in (name for name in names if name in certain or name in SCATTERS):
-        step = NextStep(answer.named_causes.advice(name), _gain(answer, name, parts))
+        step = answer.repeated.pattern_step(name) or NextStep(
+            answer.named_causes.advice(name), _gain(answer, name, parts)
+        )
         found.append((name in SCATTERS, _part(parts, [name]), step))
     open_ones = [name for name in answer.causes if name not in certain and name not in SCATTERS]
     told_apart = open_ones or [name for name in answer.causes if name not in names] or names
@@ -180,6 +182,7 @@ def rival_lines(answer: Findings) -> list[str]:
     decided = answer.decided
     rivals, run = answer.ambiguous_with if decided else (), answer.next_run
     lines = []
+    certain = answer.named_causes.certain_and_open()[0] if rivals else answer.causes
     if rivals:
         lines.append(f"These runs cannot distinguish it from {' or '.join(map(plain, rivals))}.")
     if run is not None and run_to_make(answer) is None:
@@ -192,7 +195,9 @@ def rival_lines(answer: Findings) -> list[str]:
         )
         lines.append(f"{which}: {run.words(answer.freedom, robot=answer.found.robot)}.")
     elif rivals and answer.found.driven:
-        lines.append(f"To distinguish them, {OTHER_INPUT}.")
+        open_ones = {*answer.causes, *rivals} - set(certain)
+        apart = {kind.condition for kind in known_effects() if kind.name in open_ones}
+        lines.append(f"To distinguish them, {OTHER_INPUT if apart != {'wind_on'} else OTHER_SPEED}.")
     elif rivals and unplannable(answer):
         lines.append(
             "A run that would distinguish them cannot be computed: state every spring_stiffness, or add runs."
@@ -244,11 +249,9 @@ def _look(answer: Findings) -> NextStep:
     named = f", in {listed(list(runs))}" if place is not None and 0 < len(runs) < min(place.runs, 6) else ""
     what = "the rig" if channel is None else f"what acts on {CHANNELS[channel]}"
     wind = f" {CONDITIONS['wind_on']}" if answer.where.condition == "wind_on" else ""
-    size = answer.misfit.words(answer.gap.excess_before)
-    return NextStep(
-        f"Examine {what}{wind}{named}, where the model departs from the runs",
-        f"the cause makes a misfit of {size}",
-    )
+    misfit, excess = answer.misfit, answer.gap.excess_before
+    size = f"the cause makes a misfit of {misfit.words(excess)}" if misfit.shows(excess) else ""
+    return NextStep(f"Examine {what}{wind}{named}, where the model departs from the runs", size)
 
 
 # ---- runs, the model and intervals
@@ -275,8 +278,8 @@ def _narrowing(answer: Findings) -> Iterator[NextStep]:
             part = _CUT.get(source, 1.0)
             if source == "noise" and runs is not None:
                 part = 1.0 - runs.left.get(name, 1.0) ** 2
-            if part > 0.0:
-                found.setdefault(source, []).append(_becomes(name, one, part * one.shares[source]))
+            if part > 0.0 and (becomes := _becomes(name, one, part * one.shares[source])):
+                found.setdefault(source, []).append(becomes)
     for source, gains in found.items():
         what = _NARROWS[source].format(other="inputs" if answer.found.driven else "release angles")
         if source == "noise" and runs is not None:
@@ -303,14 +306,19 @@ def _narrower(answer: Findings) -> str:
     most = max(after, key=lambda name: after[name].shares.get("rivals", 0.0), default="")
     if not most or after[most].shares.get("rivals", 0.0) < _GAINS:
         return ""
-    return f"; {_becomes(most, after[most], after[most].shares['rivals'])}"
+    becomes = _becomes(most, after[most], after[most].shares["rivals"])
+    return f"; {becomes}" if becomes else ""
 
 
 _GAINS = 0.55  # share of a variance: without it the standard deviation falls by a third
 
 
 def _becomes(name: str, given: Quantity, part: float) -> str:
-    """The interval of a coefficient without a part of its variance, such as ``Cnr becomes ± 5 % (now ± 12 %)``."""
+    """The interval of a coefficient without a part of its variance, such as ``Cnr becomes ± 5 % (now ± 12 %)``.
+
+    Empty where both are shown alike.
+    """
     now = given.reach / abs(given.value)
     left = now * math.sqrt(max(1.0 - part, 0.0))
-    return f"{COEFFICIENTS.get(name, name)} becomes {within(left)} (now {within(now)})"
+    before, after = within(now), within(left)
+    return "" if before == after else f"{COEFFICIENTS.get(name, name)} becomes {after} (now {before})"

@@ -43,6 +43,7 @@ ONE_WIND: Final = 0.02
 gap belongs to the larger. Judgement."""
 
 _WIND = "whether it needs wind cannot be determined"
+_WIND_OFF = "wind-off runs show it"
 
 
 def _alone(given: Mapping[str, Any]) -> str:
@@ -58,7 +59,7 @@ REASONS: Mapping[str, str | Callable[[Mapping[str, Any]], str]] = {
     "no single run": f"{_WIND}, since no single run shows it",
     "one run": f"{_WIND} from one run alone ({{run}})",
     "wind-off runs not fitted": f"{_WIND}, since the wind-off runs could not be fitted alone",
-    "wind-off runs show it": lambda given: f"{_alone(given)} it too",
+    _WIND_OFF: lambda given: f"{_alone(given)} it too",
     "wind-off runs show none": lambda given: f"{_alone(given)} no gap",
     "blow": "most of the missing moment acts between {from_s:.1f} and {to_s:.1f} s",
     "spectral line": "it is a spectral line near {frequency_hz:.3g} Hz",
@@ -89,7 +90,7 @@ def where_words(where: Where, place: PlaceFound | Nowhere | None, judged: Judged
     if place is None:
         return ""
     if isinstance(place, Nowhere):
-        return _nowhere(place)
+        return _nowhere(place, judged.settings.where.run_rate)
     parts = [f"{_which_runs(where, place)}."]
     if places := _places(where, place, judged.misfit.unit):
         most = part(judged.settings.where.interval_share).capitalize()
@@ -103,30 +104,40 @@ def where_words(where: Where, place: PlaceFound | Nowhere | None, judged: Judged
     acts = f"It acts on {words}" if words else "The residuals alone do not show what it acts on"
     if words and place.compared and (place.alike or not (place.agrees or place.elsewhere)):
         acts = f"It looks like a change of {words}"  # the causes produce the same pattern
+    agreement = _agreement(where, place)
     between = place.channel.kind in BETWEEN_RUNS and bool(scattering(judged.causes))
     if between:
-        acts, channel = "Most of it is between the runs", "each run alone is linear"
+        acts, channel, agreement = "Most of it is between the runs", "each run alone is linear", ""
     if where.condition is None:
         parts.append(f"{acts}: {channel}; {condition}.")
     else:
         parts.append(f"{acts}: {channel}.")
         if place.wind:  # runs with wind and without it are needed to state the condition
             conditions = {effect_class(name).condition for name in place.compared}
-            if conditions and where.condition not in conditions:  # the causes act in other runs, too
-                parts.append(f"{condition[:1].upper()}{condition[1:]}.")
+            if conditions and where.condition not in conditions:  # the causes act in other runs
+                if place.condition.kind == _WIND_OFF:  # a gap of their own
+                    condition = f"{_alone(place.condition.figures)} a gap too"
+                parts += [agreement, f"{condition[:1].upper()}{condition[1:]}."]
+                agreement = ""
             else:
                 parts.append(f"It appears {CONDITIONS[where.condition]}: {condition}.")
-    return " ".join(filter(None, (*parts, "" if between else _agreement(where, place))))
+    return " ".join(filter(None, (*parts, agreement)))
 
 
-def _nowhere(found: Nowhere) -> str:
-    """The sentence for a campaign without a gap."""
+def _nowhere(found: Nowhere, run_rate: float) -> str:
+    """The sentence for a campaign without a gap.
+
+    Args:
+        run_rate: false-alarm rate of the test of single runs.
+    """
     count = found.runs
     runs = f"Nowhere: in {count} {'run' if count == 1 else 'runs'} the residual is"
     chance = f"p {p_text(found.p_value)} for the run that differs most, corrected for their number"
     if found.within_step:
         return f"{runs} not white noise ({chance}), but within the steps of the readings."
-    return f"{runs} consistent with the noise ({chance})."
+    departs = count > 1 and found.p_value < run_rate  # all runs together show no gap
+    together = " together, though one alone departs from it" if departs else ""
+    return f"{runs} consistent with the noise{together} ({chance})."
 
 
 def _which_runs(where: Where, place: PlaceFound) -> str:
@@ -140,7 +151,8 @@ def _which_runs(where: Where, place: PlaceFound) -> str:
             "runs); the gap shows only in all of them together"
         )
     elif len(runs) == count:
-        text = f"All {count} runs show the gap" if count > 1 else "The run shows the gap"
+        every = "Both" if count == 2 else f"All {count}"
+        text = f"{every} runs show the gap" if count > 1 else "The run shows the gap"
     elif len(runs) == 1:
         text = f"{share} is in one run of {count}{named}"
     else:

@@ -259,8 +259,9 @@ def _largest(
 
 
 def _as_subject(kind: str) -> str:
-    """A kind of law at the start of a sentence; a comma closes its apposition."""
-    return KINDS[kind].capitalize() + ("," if "," in KINDS[kind] else "")
+    """A kind of law at the start of a sentence; a comma closes an apposition, but no list."""
+    name = KINDS[kind]
+    return name.capitalize() + ("," if ", " in name and " or " not in name else "")
 
 
 def _with_values(law: Law, per_inertia: bool) -> str:

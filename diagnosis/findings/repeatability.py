@@ -216,6 +216,22 @@ class RunRepeatability:
             return f"Without it no known effect explains the gap ({known})."
         return f"Without it the answer is {plain(*causes)} ({known})."
 
+    def pattern_step(self, effect: str) -> NextStep | None:
+        """The step in place of the remedy of a scatter; None unless a pattern explains most of the scatter.
+
+        Args:
+            effect: name of the scatter.
+        """
+        width = next((one.width for one in self.spreads if one.effect == effect), 0.0)
+        trend = next((one for one in self.trends if one.effect == effect), None)
+        if trend is None or 2.0 * trend.left**2 > width**2:
+            return None
+        number = NUMBERS[SCATTERS[effect]]
+        along = _ALONG.get(trend.along)
+        course = "from the first run to the last" if along is None else f"with the {along}"
+        what = f"Look for what makes {number} differ {course}"
+        return NextStep(what, "most of the difference between runs follows it")
+
     def steps(self, judged: Judged) -> list[NextStep]:
         """Next steps for an outlying run, and for poorly distinguished quantities."""
         run = self.outlier

@@ -15,6 +15,7 @@ from identification.show.quantity import Quantity
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties
 from tunnel_sim.vocabulary.dimensions import NUMBER, dimension, in_si, product
+from tunnel_sim.vocabulary.freedom import unit_of_frequency
 
 
 def parameter_unit(name: str, campaign: Campaign, model: NominalModel) -> str:
@@ -71,7 +72,10 @@ def sized_coefficients(found: Mapping[str, Quantity], rig: RigProperties) -> dic
 
 def own_estimates(values: Mapping[str, Quantity], similarity: Similarity) -> dict[str, Quantity]:
     """Estimates by name, in the measured campaign's units."""
-    return {name: own_estimate(value, similarity) for name, value in values.items()}
+    return {
+        name: own_estimate(value, similarity, unit_of_frequency(name, value.unit))
+        for name, value in values.items()
+    }
 
 
 def own_fact(given: Fact, similarity: Similarity) -> Fact:
@@ -106,7 +110,7 @@ def own_parameters(
         exponent = infos[parameter].rate_exponent
         free = given.get(f"{effect}.{exponent}")
         beyond = 0.0 if free is None else free.value - infos[exponent].default
-        own = own_estimate(value, similarity)
+        own = own_estimate(value, similarity, unit_of_frequency(name, value.unit))
         factor = similarity.time**-beyond
         std = None if own.std is None else own.std * factor
         # An unstated size, density or inertia is 1 in own units: only the name of the unit changes.
@@ -138,16 +142,19 @@ def own_hidden(
         name = f"{one.effect}.{one.parameter}"
         size = own_parameters({name: one.size}, campaign, similarity, model)[name]
         moves = sized_coefficients(one.moves, campaign.rig)
-        own = {coefficient: own_estimate(move, similarity) for coefficient, move in moves.items()}
-        found.append(replace(one, size=size, moves=own))
+        found.append(replace(one, size=size, moves=own_estimates(moves, similarity)))
     return tuple(found)
 
 
-def own_estimate(estimate: Quantity, similarity: Similarity) -> Quantity:
-    """An estimate in the measured campaign's units, its value and standard deviation scaled alike."""
+def own_estimate(estimate: Quantity, similarity: Similarity, unit: str = "") -> Quantity:
+    """An estimate in the measured campaign's units, its value and standard deviation scaled alike.
+
+    Args:
+        unit: the unit with which it scales; empty: its own.
+    """
 
     def own(value: float) -> float:
-        return similarity.own(value, estimate.unit)
+        return similarity.own(value, unit or estimate.unit)
 
     std, ends = estimate.std, estimate.interval
     return replace(

@@ -83,6 +83,9 @@ def verdict(answer: Findings, rest: str) -> str:
     return " ".join(filter(None, parts))
 
 
+_SMALL = "There is a gap, but its root mean square is within the noise."
+
+
 def _answer(answer: Findings, rest: str) -> str:
     """The gap, its causes, and the share of the gap that they explain."""
     causes, gap, facts = answer.causes, answer.gap, answer.found
@@ -94,7 +97,7 @@ def _answer(answer: Findings, rest: str) -> str:
         )
         return " ".join(filter(None, (sentence, repeats)))
     size = f"{gap.misfit.rms_words(excess)} root mean square, {gap.misfit.swing_words(excess)}"
-    there_is = f"There is a gap ({size})."
+    there_is = f"There is a gap ({size})." if gap.misfit.shows(excess) else _SMALL
     proper = without_scatter(causes)
     explained = f"{share(gap.closed)} of the gap {gap.closed_on}."
     if not answer.decided:

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from identification.policy import CLEAR_SWING, EQUAL_SWINGS, LEAST_SAMPLES, MISFIT_DEVIATIONS, MISFIT_RATE
+from identification.show.numbers import reading_shown
 from identification.signal.decay_fit import Reading, fit_run
 from identification.signal.frequency import follow_peaks, starting_decay, starting_frequency
 from identification.signal.noise import reading_noise, white_noise
@@ -182,7 +183,7 @@ def with_zeros(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
     remark = Remark(
         Outcome.NOTED,
         tuple(run.id for run in campaign.runs if run.id in compared),
-        f"they oscillate about zeros that differ by up to {largest:.2g} {campaign.sensor.unit}"
+        f"they oscillate about zeros that differ by up to {reading_shown(largest, 2, campaign.sensor.unit)}"
         f"{words}; a separate zero is fitted to every run of the campaign",
         "state zero = 'common' under [sensor] if the zero cannot have moved between them",
     )

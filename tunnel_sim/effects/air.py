@@ -36,7 +36,7 @@ class NonlinearYawMoment(Effect):
     place = 9
     channel = "stiffness"
     condition = "wind_on"
-    advice = "Model the nonlinear moment, or release from smaller angles"
+    advice = "Model the nonlinear moment, or use smaller angles"
     equation = "Ka (1 + κa β²) β instead of Ka β; general form: |β|^p for β²"
     signature = "Like cubic stiffness, but proportional to V² and absent with the wind off."
     references = ("Mansor & Passmore, J. Wind Eng. Ind. Aerodyn. 96 (2008) 1218",)
@@ -58,7 +58,7 @@ class NonlinearYawDamping(Effect):
     place = 11
     channel = "damping"
     condition = "wind_on"
-    advice = "Model the damping that depends on the angle, or release from smaller angles"
+    advice = "Model the damping that depends on the angle, or use smaller angles"
     equation = "Ca (1 + μa β²) β̇ instead of Ca β̇; general form: |β|^p for β²"
     signature = (
         "The aerodynamic part of the damping ratio in wind-on runs changes by the relative amount μa A²/4."

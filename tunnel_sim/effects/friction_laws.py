@@ -57,7 +57,7 @@ class CoulombFriction(Friction):
     condition = "always"
     jumps = True
     size = "dry friction of {friction_moment}"
-    advice = "Reduce the dry friction of the bearing and the potentiometer"
+    advice = "Reduce the dry friction of the bearing and the sensor"
     advice_for_joint = (
         "Reduce the dry friction of the joint (gear, bearings and seals), or add it to the model"
     )

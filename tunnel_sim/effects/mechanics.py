@@ -29,7 +29,7 @@ class CubicStiffness(Effect):
     channel = "stiffness"
     condition = "always"
     on_spring = True
-    advice = "Model the spring's cubic stiffness, or release from smaller angles"
+    advice = "Model the spring's cubic stiffness, or use smaller angles"
     advice_for_joint = "Model the cubic stiffness of the joint, or use smaller angles"
     equation = "−κ Kr β³; general form: |β|^p sgn β for β³"
     signature = "The relative change of frequency from its small-amplitude value is (3/8) κ A²."

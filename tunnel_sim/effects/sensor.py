@@ -156,7 +156,7 @@ class SensorClipping(ReadingEffect):
     channel = "sensor"
     condition = "always"
     size = "a sensor that clips beyond {limit}"
-    advice = "Widen the sensor's range, or release from smaller angles"
+    advice = "Widen the sensor's range, or use smaller angles"
     equation = "|y| ≤ L; general form: |y − c| ≤ L, approached exponentially within k L of the limit"
     signature = "The peaks of the largest swings are flat; all other readings are unchanged."
     references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)

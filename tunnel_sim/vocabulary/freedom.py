@@ -126,7 +126,7 @@ class Freedom:
             return {**value, "words": self.words(value["words"], names)} if told else value
         if isinstance(value, str):
             if "unit" in (name, owner):
-                return "1/s" if owner in _FREQUENCIES else self.unit(value)
+                return self.unit(unit_of_frequency(owner, value))
             return self.words(value, names) if name in _SENTENCES else value
         if isinstance(value, Mapping):
             return {key: self._own(one, name, str(key), names) for key, one in value.items()}
@@ -313,7 +313,23 @@ def _as_capital(old: str, new: str) -> str:
     return new[:1].upper() + new[1:] if capital else new
 
 
-_FREQUENCIES = ("omega_n",)
+_FREQUENCIES = ("omega_n", "frequency", "resonance")
+"""Quantities in rad/s that are no rate of the body."""
+
+
+def unit_of_frequency(name: str, unit: str) -> str:
+    """The unit with which a quantity scales: the radian of an angular frequency is no motion of the body.
+
+    Args:
+        name: of the quantity; for effects ``effect.parameter``.
+        unit: its unit.
+
+    Returns:
+        ``1/s`` for an angular frequency, else the unit.
+    """
+    return "1/s" if unit == "rad/s" and name.rpartition(".")[2] in _FREQUENCIES else unit
+
+
 """Quantities in rad/s that are no rate of the body."""
 _SENTENCES = (
     "what", "remedy", "verdict", "cautions", "note", "words", "reason", "notes", "blind_spots", "further", "label",
@@ -390,7 +406,7 @@ DISPLACEMENT = Freedom(
         (r"^swing(?=\n\[)", "motion"),
         (r"nominal Izz of model and support", "of the moving body"),
         (r"optional: wind_speed, spring_stiffness", "optional: spring_stiffness"),
-        (r"bearing and the potentiometer", "guide and the sensor"),
+        (r"bearing and the sensor", "guide and the sensor"),
         (r"(natural frequency of small )swings( \[)rad/s", r"\1motions\g<2>1/s"),
         (r"(ωn\s*\[)rad/s", r"\g<1>1/s"),
         (r"(ωn²\s*\[)rad²/s²", r"\g<1>1/s²"),

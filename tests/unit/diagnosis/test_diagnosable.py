@@ -1,18 +1,20 @@
 """Runs that one model fits: mixtures of springs, stated or not, are separated and reported."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from diagnosis import diagnose, vocabulary
-from diagnosis.diagnosable import comparable_runs, without_short
+from diagnosis.diagnosable import comparable_runs, gain_words, without_short
 from diagnosis.model.fact import Fact
 from diagnosis.model.similarity import frequency
 from identification.status import Outcome
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, angle_of
-from tests.support.driven_runs import driven
+from tests.support.driven_runs import GAIN, driven
+from tests.support.gap_campaigns import nominal
 from tunnel_sim.vocabulary.record import Record
 
 NOISE = 4e-4
@@ -174,3 +176,12 @@ def test_wind_speeds_within_their_reading_are_one_speed():
     found, (said,) = comparable_runs(data)
     assert [run.id for run in found.runs] == ["r01", "r02", "r03", "r04"]
     assert said == Fact("other springs", {"runs": ["r05"]})
+
+
+def test_a_gain_has_as_many_digits_as_its_deviation():
+    data = driven("unknown gain")
+    (said,) = gain_words(data, nominal(data))
+    found = re.fullmatch(r"The gain of the input is ([0-9.]+) ± ([0-9.]+) N m per unit\.", said)
+    assert found, said
+    assert abs(float(found[1]) - GAIN) < 4.0 * float(found[2])
+    assert len(found[1].partition(".")[2]) == len(found[2].partition(".")[2])

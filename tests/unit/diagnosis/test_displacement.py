@@ -92,6 +92,15 @@ def test_mass_and_damping_are_in_their_intervals(
         assert abs(found.value - truth) < 4.0 * found.known_std, name
 
 
+def test_the_natural_frequency_on_an_unknown_spring_does_not_scale_with_the_motion() -> None:
+    data = linear_campaign(0.2, (20.0,), (1e-3, 5e-4))
+    runs = tuple(replace(run, spring_stiffness=None) for run in data.runs)
+    bare = replace(data, rig=replace(data.rig, yaw_inertia=None), runs=runs)
+    found = diagnose(bare, kinds=vocabulary(("sensor_drift",))).coefficients.after["omega_n"]
+    assert found.unit == "1/s"
+    assert found.value == pytest.approx(2.0 * np.pi * 20.0, rel=1e-4)
+
+
 @pytest.mark.parametrize("case", ["dry friction of a stage"], indirect=True)
 def test_no_text_is_about_an_angle(case: tuple[Diagnosis, Campaign, str, float]) -> None:
     """In print, in the document, on the page and in its figures."""

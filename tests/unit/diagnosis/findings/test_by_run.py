@@ -62,6 +62,17 @@ def test_a_run_with_a_size_of_its_own_is_named() -> None:
     assert found.spread > 0.1
 
 
+def test_the_common_size_of_runs_that_differ_has_the_error_of_its_form() -> None:
+    """One of six equally informative runs has twice the size."""
+    (alike,), (differs,) = (sizes(cubic_of(double=one), ALL_EFFECTS) for one in (None, 2))
+    assert alike.form_std == 0.0
+    assert differs.common.std is not None
+    assert differs.form_std > 10.0 * differs.common.std  # the noise alone
+    assert differs.form_std == pytest.approx(
+        differs.spread * abs(differs.common.value) / np.sqrt(6.0), rel=0.2
+    )
+
+
 def test_a_step_finds_the_size_of_a_run_fitted_alone() -> None:
     (found,) = sizes(cubic_of(), ALL_EFFECTS)
     data = campaign(CUBIC, seed=3, duration=6.0)

@@ -216,6 +216,8 @@ def test_a_wide_interval_has_a_step_that_narrows_it(source: str, step: str, left
         (found,) = (one for one in next_steps(findings_of(given)) if "becomes" in one)
         assert found.startswith("Make 2 more runs: spring of 16.12 N m/rad, wind at 35 m/s, release at 20°")
         assert_shows(found.partition(": Cnr becomes ")[2], [0.3 * now, now])
+        given["further_runs"] = runs | {"count": 2, "left": {"cn_r": 0.9999}}
+        assert not any("becomes" in one for one in next_steps(findings_of(given)))  # ± 39 % now and then
     wide["std"] = 0.003
     assert not any(one.startswith(step) for one in next_steps(findings_of(given)))
 
@@ -226,7 +228,7 @@ def test_the_only_cause_names_the_changes_of_the_coefficients_as_the_verdict_doe
     given["waterfall"] = [{"effect": None, "excess": 10.0}, {"effect": DRY, "excess": 0.0}]
     first = next_steps(findings_of(given))[0]
     assert first == (
-        "Reduce the dry friction of the bearing and the potentiometer: removes the whole gap and corrects Cnβ by "
+        "Reduce the dry friction of the bearing and the sensor: removes the whole gap and corrects Cnβ by "
         "10 % and Cnr by 20 %."
     )
     verdict = consequence(findings_of(given))
@@ -275,7 +277,19 @@ def test_the_head_calls_no_coefficient_unchanged_that_the_first_step_corrects() 
     given["coefficients"]["after"]["cn_beta"]["interval"] = [0.36, 0.49]
     head = Head.of(findings_of(given))
     assert "Cnβ" not in head.first
-    assert "Cnβ 0.432 (0.360 to 0.490), unchanged" in head.costs
+    assert "Cnβ 0.432 (0.360 to 0.490) instead of 0.478 (within the interval)" in head.costs
+
+
+@pytest.mark.parametrize(("after", "said", "costs"), [
+    (0.4762, "Cnβ changes by less than 1 %", "unchanged"), (0.4747, "Cnβ falls by 0.69 %", "instead of 0.4780"),
+])  # fmt: skip
+def test_a_small_change_is_stated_alike_in_head_and_verdict(after: float, said: str, costs: str) -> None:
+    given = two_causes()
+    given["coefficients"]["before"]["cn_beta"]["value"] = 0.478
+    given["coefficients"]["after"]["cn_beta"] |= {"value": after, "std": 0.0001}
+    answer = findings_of(given)
+    assert said in consequence(answer)
+    assert f"{costs};" in Head.of(answer).costs.partition("Cnr")[0]
 
 
 def test_the_head_and_the_verdict_state_one_change_by_the_gap_that_remains() -> None:

@@ -175,6 +175,25 @@ def test_an_effect_without_a_confirmed_limit_is_listed_as_not_determined(monkeyp
     assert hidden_line(given) == hidden_line(findings_of(document() | {"hidden": both[1:]}))
 
 
+def test_a_refit_in_another_minimum_confirms_no_limit(monkeypatch):
+    """Linear theory takes the effect for twice as large as it is, and all further refits fail."""
+    name = "wind_speed_drift"
+    base, limited = found_beside(campaign(), name)
+    held, tried = hidden._held, []
+
+    def refit(fit, start, size, _):
+        again = held(fit, start, 0.5 * size, None)
+        tried.append(abs(size))
+        worse = 4e3 if abs(size) > tried[0] else 0.0
+        return replace(again, chi2=again.chi2 + worse / again.chi2.size)
+
+    monkeypatch.setattr(hidden, "_held", refit)
+    (found,) = hidden_effects(base, starts_beside(base, [effect_class(name)]))
+    assert limited[name].size.determined
+    assert not found.size.determined
+    assert found.moves == {}
+
+
 def test_a_further_effect_that_coloured_noise_takes_up_is_said_to_be_significant():
     """A drift of 1.5 mrad in every run, beside vortices in coloured noise that is twice as large as the white."""
     shedding = effect_from("vortex_shedding", {"amplitude": 0.1, "strouhal_number": 0.12})

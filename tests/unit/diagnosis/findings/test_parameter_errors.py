@@ -13,10 +13,11 @@ from scipy.integrate import solve_ivp
 from diagnosis import diagnose, vocabulary
 from diagnosis.answer.held_out import excess_base, one_more
 from diagnosis.answer.linear_theory import coefficient_move, move_of_halves, parameter_shift
+from diagnosis.findings.by_run import sizes
 from diagnosis.findings.candidates import candidates, parameter_errors
 from diagnosis.findings.closing import closing
-from tests.support.gap_campaigns import answer, studied
-from tunnel_sim.effects import effect_class
+from tests.support.gap_campaigns import answer, campaign, nominal, studied
+from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -130,6 +131,21 @@ def test_the_move_of_a_coefficient_is_that_of_its_gradient(base):
     whole = move_of_halves(base, np.eye(len(base.problem.names))[place])
     assert whole == pytest.approx(coefficient_move(base, "cn_r"))
     assert whole > 0.0  # the cause is missing
+
+
+def test_a_size_on_which_the_runs_differ_has_more_than_the_error_of_noise():
+    """One spring of six is cubic by twice as much, so no one size is right."""
+    one, two = (
+        campaign(effect_from("cubic_stiffness", {"coefficient": size}), duration=6.0) for size in (0.3, 0.6)
+    )
+    data = replace(one, runs=(*one.runs[:2], two.runs[2], *one.runs[3:]))
+    base = nominal(data)
+    best = one_more(base, effect_class("cubic_stiffness"))
+    study = studied(data, base, ("cubic_stiffness",), best)
+    study = replace(study, answers=(answer(("cubic_stiffness",), 0.0, 1.0, best),))
+    name = "cubic_stiffness.coefficient"
+    (own,) = sizes(best, study.prepared.kinds)
+    assert parameter_errors(study, closing(study))[name] >= own.form_std > 10.0 * best.std(name)
 
 
 def test_a_named_disagreement_of_the_integrators_is_part_of_the_deviation(data, base):

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.answer.run_deviations import ScatterLimits
+from diagnosis.answer.run_deviations import ScatterLimits, Spread, Trend
 from diagnosis.findings.cautions import CAUTIONS, sentence_of
 from diagnosis.findings.judgements import zeros_apart
 from diagnosis.findings.repeatability import RunRepeatability
@@ -63,6 +63,19 @@ def test_a_wind_that_follows_the_spring_is_no_chance() -> None:
     assert (trend.effect, trend.along, trend.only) == (SPEED, "spring_stiffness", False)
     assert trend.change == pytest.approx(0.03, abs=4.0 * trend.std)
     assert trend.left < 0.003
+
+
+def test_scatter_that_follows_a_pattern_is_not_answered_with_the_remedy_of_chance() -> None:
+    spread = Spread(SPEED, 0.01, (0.005, 0.02), None, True, {})
+    trend = Trend(SPEED, 0.02, 1e-4, 1e-6, 1e-4, along="spring_stiffness")
+    step = RunRepeatability((spread,), trends=(trend,)).pattern_step(SPEED)
+    assert step is not None
+    assert step.words.startswith("Look for what makes the wind speed differ with the stiffness of the spring")
+    by_order = RunRepeatability((spread,), trends=(replace(trend, along="order"),)).pattern_step(SPEED)
+    assert by_order is not None
+    assert "from the first run to the last" in by_order.words
+    for others in ((), (replace(trend, left=0.008),), (replace(trend, effect="stiffness_scatter"),)):
+        assert RunRepeatability((spread,), trends=others).pattern_step(SPEED) is None
 
 
 def test_a_wind_that_differs_by_chance_does_not_drift() -> None:

@@ -64,6 +64,19 @@ def test_the_runs_that_show_the_gap(given: Document) -> None:
     assert placed(given).startswith("No single run is beyond chance (false-alarm rate 1 % over all runs)")
 
 
+def test_a_gap_of_the_wind_off_runs_is_not_that_of_a_cause_that_needs_wind(given: Document) -> None:
+    text = placed(given, compared=["nonlinear_yaw_damping"])
+    assert text.endswith(
+        "That agrees with nonlinear yaw damping. The 2 wind-off runs, fitted alone, show a gap too."
+    )
+    assert "It appears" not in text
+
+
+def test_two_runs_that_show_the_gap_are_both(given: Document) -> None:
+    given["where"]["runs"] = list(IDS[:2])
+    assert placed(given, runs=2).startswith("Both runs show the gap")
+
+
 def test_only_what_locates_the_gap_is_said(given: Document) -> None:
     assert "of the gap lie at 1.88 to 2.62 Hz." in placed(given, narrow=["frequency_hz"])
     text = placed(given, narrow=[], bands={})
@@ -111,6 +124,8 @@ def test_without_a_gap_it_is_nowhere(given: Document, within_step: bool, end: st
     text = where_words(findings_of(given))
     assert text.startswith("Nowhere: in 3 runs the residual is")
     assert text.endswith(end)
+    given["found"]["nowhere"]["p_value"] = 0.004
+    assert ("though one alone departs from it (p = 0.004" in where_words(findings_of(given))) != within_step
 
 
 FIGURES = {
@@ -151,6 +166,7 @@ def test_caveats_state_their_figures() -> None:
     assert "A fault of this run cannot be told from a cause." in few(1)
     assert "fault" not in few(2)
     assert few(2, windy=True).endswith("springs, wind speeds and release angles.")
+    assert few(2, windy=True, driven=True).endswith("springs, wind speeds and inputs.")
     assert few(2, driven=True).endswith(
         "form of the motion alone distinguishes causes. Add runs with other inputs."
     )
@@ -274,6 +290,10 @@ def test_what_could_be_closed(given: Document) -> None:
     timed = [CEILINGS[0] | {"kind": "time"}]
     assert text(kind="time", ceilings=timed).startswith(
         "A moment in time, equal in all runs, could explain 85.0"
+    )
+    between = [CEILINGS[0] | {"kind": "between"}]
+    assert text(kind="between", ceilings=between).startswith(
+        "A stiffness, damping or moment of each run could explain 85.0"
     )
     stated = {"moment": "k*b^n", "parameters": {"k": {"unit": "N m"}, "n": {"unit": "1"}}}
     values = {"k": {"value": -0.2457, "std": 0.0012}, "n": {"value": 3.0, "std": 0.02}}

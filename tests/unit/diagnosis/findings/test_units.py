@@ -10,6 +10,7 @@ from diagnosis.findings.units import own_parameters, parameter_unit, sized_coeff
 from diagnosis.model.choose import nominal_model
 from diagnosis.model.rig import PerInertia
 from diagnosis.model.similar import similar_campaign
+from diagnosis.model.similarity import Similarity
 from identification import identify
 from identification.show.quantity import Quantity
 from tests.marks import slow
@@ -19,6 +20,7 @@ from tests.support import gap_campaigns
 from tunnel_sim.effects import ALL_EFFECTS, effect_from
 from tunnel_sim.vocabulary.campaign import RigProperties
 from tunnel_sim.vocabulary.dimensions import dimension
+from tunnel_sim.vocabulary.freedom import DISPLACEMENT
 
 SETTINGS = tuple(Setting(spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 12.0, 24.0))
 RIGS = {
@@ -83,6 +85,18 @@ def test_units_without_springs_and_sizes(data):
     assert parameter_unit("buffeting.intensity", nothing, PerInertia()) == "m/kg"
     thin = replace(nothing, runs=tuple(replace(run, air_density=None) for run in nothing.runs))
     assert parameter_unit("buffeting.intensity", thin, PerInertia()) == "1/m2"  # the density is within it
+
+
+def test_an_angular_frequency_does_not_scale_with_a_displacement(data):
+    given = {
+        "second_mode.amplitude": Quantity(0.02, 0.01, "rad"), "second_mode.frequency": Quantity(60.0, 0.1, "rad/s"),
+        "second_mode.damping_ratio": Quantity(0.01, 0.001, "1"),
+    }  # fmt: skip
+    found = own_parameters(given, data, Similarity(time=2.0, angle=128.0), nominal_model(data))
+    assert found["second_mode.amplitude"].value == pytest.approx(0.02 / 128.0)
+    assert found["second_mode.frequency"].value == pytest.approx(Similarity(time=2.0).own(60.0, "Hz"))
+    units = {name: DISPLACEMENT.document({name: one})[name].unit for name, one in found.items()}
+    assert list(units.values()) == ["m", "1/s", "1"]
 
 
 @pytest.mark.parametrize("quantity", ["angle", "rate", "acceleration"])

@@ -471,7 +471,44 @@ def test_what_to_do_about_runs_is_said_once() -> None:
     assert not any("cut it by hand" in step for step in steps)  # the run is used as it is cut
 
 
-OF_A_TUNNEL = ("spring", "wind", "potentiometer", "turbulence", "rod", "level the axis", "draught")
+def test_a_gap_within_the_noise_is_said_without_a_misfit_of_zero():
+    small = replace(gap(True), excess_before=-1e-4, excess_after=-1e-4)
+    one = answer_of("unknown", size=small)
+    text = verdict(findings_of(one), "")
+    assert text.startswith("There is a gap, but its root mean square is within the noise. No ")
+    (look, *_) = next_steps(findings_of(one))
+    assert look.startswith("Examine ")
+    assert "misfit" not in look
+    assert "makes a misfit of" in next_steps(findings_of(answer_of("unknown")))[0]
+
+
+def test_effects_that_the_wind_speed_separates_are_separated_by_another_speed():
+    one = answer_of("reynolds_dependence", driven=True) | {
+        "next_run": None,
+        "ambiguous_with": ["wind_speed_offset"],
+    }
+    one["candidates"] = [
+        {"effect": name, "probability": value, "parameters": {}}
+        for name, value in (("reynolds_dependence", 0.6), ("wind_speed_offset", 0.4))
+    ]
+    assert rival_lines(findings_of(one))[-1].startswith(
+        "To distinguish them, record a run at another wind speed"
+    )
+    one["candidates"][0]["effect"] = "cubic_stiffness"
+    other = one | {"causes": ["cubic_stiffness"]}
+    assert "another wind speed" not in rival_lines(findings_of(other))[-1]
+
+
+OF_A_TUNNEL = (
+    "spring",
+    "wind",
+    "potentiometer",
+    "bearing and the sensor",
+    "turbulence",
+    "rod",
+    "level the axis",
+    "draught",
+)
 
 
 @pytest.mark.parametrize("driven", [False, True])

@@ -40,7 +40,7 @@ def test_zeros_that_differ_are_given_to_every_run_and_said():
     kept, (remark,) = with_zeros(data)
     assert kept.sensor.zero == "per_run"
     assert remark.runs == tuple(name for name, _ in REPEATS)
-    assert "0.06 rad" in remark.what
+    assert "up to 3.4° under" in remark.what
     assert identify(data).remarks == (remark,)
 
 
@@ -81,7 +81,7 @@ def of_two_swings(zero=0.0, seed=0, springs=(16.0,)):
 def test_zeros_of_unequal_swings_are_compared_as_well_as_each_run_bounds_a_shift_by_its_amplitude():
     kept, (remark,) = with_zeros(of_two_swings(0.01))
     assert kept.sensor.zero == "per_run"
-    assert "differ by up to 0.01 rad under equal conditions" in remark.what
+    assert "differ by up to 0.57° under equal conditions" in remark.what
 
 
 @pytest.mark.parametrize("coefficient", [0.05, 0.5])
@@ -117,7 +117,7 @@ def test_zeros_that_differ_are_known_from_runs_of_different_conditions():
     own = np.random.default_rng(4).normal(0.0, 0.005, len(GRID))
     kept, (remark,) = with_zeros(grid(own))
     assert kept.sensor.zero == "per_run"
-    assert "rad, more than wind, spring and amplitude shift them; " in remark.what
+    assert "°, more than wind, spring and amplitude shift them; " in remark.what
     assert len(remark.runs) == len(GRID)
 
 
