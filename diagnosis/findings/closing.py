@@ -108,12 +108,16 @@ def _without_needless(study: Study, steps: Waterfall) -> Study | None:
     """The study with the subset of the fitted causes that predicts held-out readings best.
 
     Returns:
-        None where all of them together predict best, or beside a random moment, which absorbs the causes.
+        None where all of them together predict best, or beside a random moment, which absorbs the causes. A cause
+        without a size is left out in any case: the freed form of another replaces it.
     """
-    answer = study.answer
+    answer, fitted = study.answer, study.chosen
     if answer is None or not study.named or study.moment is not None:
         return None
     whole = frozenset(answer.effects)
+    acting = whole - {one.name for one in fitted.problem.effects_at(fitted.point.common) if one.is_null}
+    if acting and acting != whole:
+        return study.of_part(tuple(sorted(acting)))
     parts = {whole - {name}: left for name, left in steps.without.items() if name in whole}
     added: frozenset[str] = frozenset()
     for step in steps.steps:

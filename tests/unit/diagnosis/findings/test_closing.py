@@ -20,7 +20,7 @@ from diagnosis.findings.closing import (
     report_fits,
 )
 from diagnosis.findings.judgements import cautions
-from diagnosis.likelihood.least_squares import Fit
+from diagnosis.likelihood.least_squares import Fit, fit_at
 from diagnosis.likelihood.partial import refit_releases
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.sensitivities import sensitivities
@@ -97,6 +97,17 @@ def test_a_cause_that_reduces_it_stays(both, monkeypatch):
     study, found = confirmed(both)
     assert study is both
     assert found.gap.excess_after == 0.1
+
+
+def test_a_cause_of_no_size_is_not_part_of_the_answer(both, monkeypatch):
+    """Though the set explains more: by the form of the other cause, which was freed beside it."""
+    held_out(monkeypatch, 0.11)
+    whole = both.chosen
+    none = np.where(np.array(whole.problem.names) == f"{IDLE}.coefficient", 0.0, whole.point.common)
+    absent = answer(both.fitted, 0.0, 0.6, fit_at(whole.problem, Point(none, whole.point.per_run)))
+    study, _ = confirmed(replace(both, answers=(absent, *both.answers[1:])))
+    assert study.causes == (CAUSE,)
+    assert study.needless == (IDLE,)
 
 
 def test_without_the_refused_set_an_unknown_cause_may_be_likelier_than_all_others(both, monkeypatch):

@@ -182,6 +182,17 @@ def test_stated_scatter_is_no_gap_but_more_than_that_is() -> None:
     assert beyond.causes
 
 
+def test_two_runs_have_the_stated_scatter_that_they_cannot_show() -> None:
+    """The inertia's deviation is that of a spring over the root of two, at least; by noise alone it is half of that."""
+    stds = []
+    for stated in (Repeatability(spring_stiffness=SPRING, mechanical_damping=DAMPER), None):
+        several = campaign(cubic=0.1, repeatability=stated)
+        study = investigate(replace(several, runs=several.runs[:2]), FEW)
+        assert study.fitted == ("cubic_stiffness",)
+        stds.append(study.similarity.own(study.chosen.std("yaw_inertia"), "kg m2"))
+    assert stds[0] > 0.7 * INERTIA * SPRING / np.sqrt(2.0) > 2.0 * stds[1]
+
+
 def test_intervals_hold_the_scatter() -> None:
     """The inertia's standard deviation is that of a spring over the root of the number of runs, at least."""
     study, repeats = (studied(scatter=size) for size in (1.0, 0.0))
