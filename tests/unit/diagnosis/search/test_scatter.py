@@ -183,7 +183,7 @@ def test_stated_scatter_is_no_gap_but_more_than_that_is() -> None:
 
 
 def test_two_runs_have_the_stated_scatter_that_they_cannot_show() -> None:
-    """The inertia's deviation is that of a spring over the root of two, at least; by noise alone it is half of that."""
+    """The inertia has the deviation of a spring over the root of two, at least; noise alone gives half of that."""
     stds = []
     for stated in (Repeatability(spring_stiffness=SPRING, mechanical_damping=DAMPER), None):
         several = campaign(cubic=0.1, repeatability=stated)
