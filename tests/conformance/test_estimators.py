@@ -248,16 +248,13 @@ def test_a_contradiction_that_is_said_widens_the_intervals(name, case):
 
 @each_estimator
 @pytest.mark.parametrize("slip", [1e3, slow(1.0 / 3600.0)])
-def test_an_inertia_that_the_springs_contradict_widens_the_intervals(name, slip):
+def test_coefficients_are_withheld_where_the_springs_contradict_the_inertia_by_decades(name, slip):
     settings = TWO_SPRINGS[::2]
     data = campaign(settings, noise=5e-4, rng=np.random.default_rng(5), duration=6.0, rate=500.0)
     stated = replace(data, rig=replace(data.rig, yaw_inertia=Truth().yaw_inertia / slip))
     found = identify(stated, name, throw=False)
-    if slip == 1e3:  # a wrong unit makes the coefficients wrong by decades
-        assert Status.COEFFICIENTS_WITHHELD in found.statuses
-        assert found.yaw_inertia is found.cn_beta is None
-    else:
-        assert abs(found.yaw_inertia.value - stated.rig.yaw_inertia) < 1.96 * found.yaw_inertia.std
+    assert Status.COEFFICIENTS_WITHHELD in found.statuses
+    assert found.yaw_inertia is found.cn_beta is None
     kept = replace(stated, sensor=replace(stated.sensor, plausible=False))
     assert identify(kept, name) == identify(data, name)
 
