@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -30,15 +30,12 @@ class Data(PreparedRuns):
         similarity: how the campaign was made from the measured one.
         settings: settings of the diagnosis.
         freedom: freedom of the body.
-        repeatability: stated relative standard deviations between runs, by scattering quantity; empty: none is
-            stated.
     """
 
     model: NominalModel
     similarity: Similarity = AS_MEASURED
     settings: Settings = field(default_factory=Settings)
     freedom: Freedom = ANGLE
-    repeatability: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def wind_on(self) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -369,12 +370,15 @@ class PreparedRuns(RunGroups[RunData]):
         frontal_area: A, m². This and the two lengths are 1 in the measured campaign's units where not stated.
         reference_length: l, m.
         width: m.
+        repeatability: stated relative standard deviations between runs, by scattering quantity; empty: none is
+            stated.
     """
 
     runs: tuple[RunData, ...]
     frontal_area: float
     reference_length: float
     width: float
+    repeatability: Mapping[str, float] = field(default_factory=dict, kw_only=True)
 
     @property
     def inputs(self) -> tuple[InputMoment, ...]:
