@@ -50,6 +50,10 @@ ABSORBED_RATE: Final = 0.01
 """Rate at which the power of a random motion, over the power that a fit leaves of it, exceeds its limit.
 Convention."""
 
+ABSORBED_MARGIN: Final = 1.5
+"""Factor on this limit for the spectrum of a real moment, which is not of first order. Judgement. Turbulence of a
+limited band exceeded the limit by a factor of 1.09."""
+
 _SIMULATED = 200  # campaigns of a random motion
 _ABSORBED = 1e-9  # least singular value of the columns of a run, relative to the largest
 _LINE_WIDTHS = 3.0  # about the centre of a spectrum in which a line is sought
@@ -180,8 +184,8 @@ def _drop_beside(own: Sequence[Array], fit: Fit, source: MomentSource) -> float:
 
 
 def most_absorbed(process: ProcessNoise, fitted: Fit) -> float:
-    """Greatest power of a random motion by chance, as a multiple of the power that a fit leaves of it."""
-    return float(np.quantile(absorption(process, fitted), 1.0 - ABSORBED_RATE))
+    """Greatest power of a random motion, as a multiple of the power that a fit leaves of it."""
+    return ABSORBED_MARGIN * float(np.quantile(absorption(process, fitted), 1.0 - ABSORBED_RATE))
 
 
 def absorption(process: ProcessNoise, fitted: Fit) -> Array:

@@ -183,8 +183,6 @@ def test_a_law_that_is_missing_is_no_random_moment(monkeypatch):
     assert is_no_noise(base)  # so that none is even sought
     assert weigh_random_moments(whole_runs(base, BOTH), []) == []
     monkeypatch.setattr(random_moments, "is_no_noise", lambda _: False)
-    assert weigh_random_moments(whole_runs(base, BOTH), []) == []  # far above the least residual
-    monkeypatch.setattr(random_moments, "is_inflated", lambda *_: False)
     assert [answer.names for answer in weigh_random_moments(whole_runs(base, BOTH), [])] == [("buffeting",)]
 
 
