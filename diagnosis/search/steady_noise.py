@@ -202,17 +202,21 @@ def absorption(process: ProcessNoise, fitted: Fit) -> Array:
     if noisy is None:
         return np.ones(1)
     rng = np.random.default_rng([zlib.crc32(run.reading.tobytes()) for run in noisy.runs])
-    motion, beside, columns = [], [], []
-    for run, shaken, (common, own) in zip(fitted.problem.data.runs, noisy.runs, fitted.jacobian, strict=True):
-        moved = np.zeros((run.reading.size, _SIMULATED))
+    bases = [orthonormal(own) for _, own in fitted.jacobian]
+    beside = [
+        common - basis @ (basis.T @ common) for (common, _), basis in zip(fitted.jacobian, bases, strict=True)
+    ]
+    ends = np.cumsum([run.reading.size for run in noisy.runs])[:-1]
+    of_all = np.split(orthonormal(np.concatenate(beside)), ends)
+    whole, own_left = np.zeros((2, _SIMULATED))
+    along = np.zeros((of_all[0].shape[1], _SIMULATED))
+    for run, shaken, basis, common in zip(fitted.problem.data.runs, noisy.runs, bases, of_all, strict=True):
         if run.id in process.runs:
-            white = rng.standard_normal(moved.shape).T * shaken.noise.scale
+            white = rng.standard_normal((run.reading.size, _SIMULATED)).T * shaken.noise.scale
             moved = np.stack([run.scaled(shaken.noise.coloured(one)) for one in white], axis=1)
-        absorbed = orthonormal(own)
-        motion.append(moved)
-        beside.append(moved - absorbed @ (absorbed.T @ moved))
-        columns.append(common - absorbed @ (absorbed.T @ common))
-    absorbed, moved = orthonormal(np.concatenate(columns)), np.concatenate(beside)
-    left = moved - absorbed @ (absorbed.T @ moved)
-    whole: Array = np.sum(np.concatenate(motion) ** 2, axis=0) / np.sum(left**2, axis=0)
-    return whole
+            whole += np.sum(moved**2, axis=0)
+            moved -= basis @ (basis.T @ moved)
+            own_left += np.sum(moved**2, axis=0)
+            along += common.T @ moved
+    left: Array = own_left - np.sum(along**2, axis=0)
+    return whole / left
