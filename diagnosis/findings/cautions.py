@@ -162,6 +162,8 @@ NOISE: Mapping[str, Sentence] = {
     "{uncertainty_rad:1}",
     "differs by run": "the records contradict the stated {stated_rad:3}: their noise differs by run, "
     "{least_rad:3} to {most_rad:3}",
+    "some runs differ": "most records agree with the stated {stated_rad:3}, and others do not: {least_rad:3} to "
+    "{most_rad:3}",
 }
 """Clauses that give the reason for the noise used."""
 

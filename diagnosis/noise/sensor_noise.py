@@ -209,7 +209,8 @@ def campaign_noise(campaign: Campaign, chosen: NoiseSettings) -> Noise:
     else:
         span = {"least_rad": float(np.sqrt(variances.min())), "most_rad": float(np.sqrt(variances.max()))}
         beside = {"stated_rad": float(np.sqrt(stated))}
-        reason = Fact("contradicts", beside | level) if uniform else Fact("differs by run", beside | span)
+        apart = "some runs differ" if agreed and alike.any() else "differs by run"
+        reason = Fact("contradicts", beside | level) if uniform else Fact(apart, beside | span)
     return Estimated(used, stated, reason, pooled, uncertainty, measured)
 
 

@@ -156,7 +156,9 @@ def rescaled(data, place, factor):
 def test_a_run_that_differs_has_its_own_noise_and_the_others_share_theirs(stated, factor):
     data = decays(stated_noise=stated)
     assert len(set(campaign_noise(data, Settings().noise).variance.values())) == 1
-    variance = campaign_noise(rescaled(data, 2, factor), Settings().noise).variance
+    found = campaign_noise(rescaled(data, 2, factor), Settings().noise)
+    assert found.reason.kind == ("some runs differ" if stated else "not stated")
+    variance = dict(found.variance)
     assert variance.pop(data.runs[2].id) == pytest.approx((factor * NOISE) ** 2, rel=0.3)
     (common,) = set(variance.values())
     assert common == (stated**2 if stated else pytest.approx(NOISE**2, rel=0.1))
