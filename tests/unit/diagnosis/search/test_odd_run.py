@@ -115,6 +115,7 @@ def test_a_run_alone_at_its_spring_or_without_wind_is_not_odd(plain: Campaign) -
     kept = replace(plain, runs=(*plain.runs[:3], plain.runs[4]))
     assert replaceable(nominal(kept).problem.data) == [1, 2]
     assert nominal_study(spoilt(kept, "r5", settled), FEW).disturbed == ()
+    assert replaceable(nominal(replace(plain, runs=plain.runs[:2])).problem.data) == []
 
 
 def test_a_cause_of_all_runs_accuses_none() -> None:

@@ -185,8 +185,9 @@ def test_stated_scatter_is_no_gap_but_more_than_that_is() -> None:
 def test_two_runs_have_the_stated_scatter_that_they_cannot_show() -> None:
     """The inertia has the deviation of a spring over the root of two, at least; noise alone gives half of that."""
     stds = []
-    for stated in (Repeatability(spring_stiffness=SPRING, mechanical_damping=DAMPER), None):
-        several = campaign(cubic=0.1, repeatability=stated)
+    known = Repeatability(spring_stiffness=SPRING, mechanical_damping=DAMPER)
+    for scatter, stated in ((1.0, known), (0.0, None)):
+        several = campaign(scatter=scatter, cubic=0.1, repeatability=stated)
         study = investigate(replace(several, runs=several.runs[:2]), FEW)
         assert study.fitted == ("cubic_stiffness",)
         stds.append(study.similarity.own(study.chosen.std("yaw_inertia"), "kg m2"))
