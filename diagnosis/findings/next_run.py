@@ -42,6 +42,7 @@ Judgement."""
 _ANGLES = (1.0, 0.4)  # shares of the largest swing of the runs
 _DURATIONS = (10.0, 30.0)  # s
 _MOST_SPEEDS = 4
+_ROUNDS = 3  # rounds of fitting the deviations of a planned run: they shift its phase far
 _PHASES = 8  # phases of the true model's periodic effect, to average over
 _PHASES_TRIED = (1, 720, 72)  # phases of each of the rival's periodic effects (none, one or two), to fit
 
@@ -93,7 +94,7 @@ class NextRun(PlannedRun):
     """The run with the largest difference between the predictions of two models.
 
     Args:
-        separation: expected difference of the predictions (see `separation`), in standard deviations of the noise.
+        separation: expected difference of the predictions (see `separation`), in standard deviations.
     """
 
     separation: float
@@ -137,7 +138,7 @@ class NextRun(PlannedRun):
         """The statement that no run distinguishes two answers."""
         return (
             "No run with the springs and wind speeds of this campaign distinguishes these answers: in the best one "
-            f"they differ by {self.separation:.1f} standard deviations of the noise."
+            f"they differ by {self.separation:.1f} standard deviations."
         )
 
     def words(self, freedom: Freedom = ANGLE, *, robot: bool = False) -> str:
@@ -311,57 +312,94 @@ def separation(first: Fit, second: Fit, run: RunData, angle: float) -> float | N
         angle: release angle, rad.
 
     Returns:
-        The misfit of the rival in standard deviations of the noise, after its release and the phases of its
-        periodic effects are refitted. The phases of the true model cannot be chosen: the misfit is a root mean
-        square over them. Each model is taken as the true one in turn, and the smaller misfit counts. None where
-        a model's motion diverges. Half the square is the expected log-likelihood ratio of the run, in nats, if
-        one of the two models is right.
+        The misfit of the rival in standard deviations, after its release, its chance differences between runs and
+        the phases of its periodic effects are refitted. A standard deviation is the noise, or the misfit that
+        both models leave where that is larger. The phases of the true model cannot be chosen: the misfit is a
+        root mean square over them. Each model is taken as the true one in turn, and the smaller misfit counts.
+        None where a model's motion diverges. Half the square is the expected log-likelihood ratio of the run, in
+        nats, if one of the two models is right.
     """
     one, other = _predict(first, run, angle), _predict(second, run, angle)
     if one is None or other is None:
         return None
-    return min(_missed(one, other), _missed(other, one)) / run.noise.scale
+    left = max(1.0, min(1.0 + first.excess, 1.0 + second.excess))
+    missed = (
+        _missed(one, _nearer(other, one, second, run), run),
+        _missed(other, _nearer(one, other, first, run), run),
+    )
+    return min(missed) / (run.noise.scale * float(np.sqrt(left)))
 
 
 @dataclass(frozen=True, eq=False)
 class _Prediction:
-    """A model's prediction of a run."""
+    """A model's prediction of a run; behind the n readings, zeros for the priors of the run's deviations."""
 
-    reading: Array  # mean over the phases of its periodic effects, rad, shape (n,)
-    waves: Array  # contributions of the cosine and the sine of each phase, rad, shape (n, 2 × effects)
-    slopes: Array  # derivatives to the release, shape (n, 2)
+    reading: Array  # mean over the phases of its periodic effects, rad, shape (n + deviations,)
+    waves: Array  # contributions of the cosine and the sine of each phase, rad, (n + deviations, 2 × effects)
+    slopes: Array  # changes by steps of the release and the deviations, rad, shape (n + deviations, steps)
+    own: Array  # parameters of the run, shape (own,)
+    steps: Array  # steps of these parameters, shape (steps, own)
 
 
-def _predict(fit: Fit, run: RunData, angle: float) -> _Prediction | None:
+def _predict(fit: Fit, run: RunData, angle: float, own: Array | None = None) -> _Prediction | None:
     """Predict a run; None where it cannot be integrated.
 
     The response to a periodic effect is of first order in its size, so it rotates with the effect's phase.
+
+    Args:
+        own: parameters of the run; None: a release at the angle, without deviations.
     """
-    problem, own = _planned(fit, (run,), angle)
+    problem, start = _planned(fit, (run,), angle)
+    own = start if own is None else own
     turns = _turning(problem)
     count = int(turns.sum())
-    steps = np.array([1e-4 * angle, 1e-3 * angle])
     first = len(problem.parameters.own) - problem.parameters.of_effects
-    rows = [own, *(own + np.eye(2, own.size) * steps[:, None])]
+    deviations = problem.parameters.places(problem.scatter)
+    widths = problem.parameters.precision[deviations] ** -0.5
+    steps = np.zeros((2 + len(deviations), own.size))
+    steps[[0, 1], [0, 1]] = 1e-4 * angle, 1e-3 * angle
+    steps[range(2, len(steps)), deviations] = widths
+    rows = [own, *(own + steps)]
     for turn in (0.5 * np.pi, np.pi):
         rows += list(own + turn * np.eye(own.size)[first:][turns])
     values = np.stack([v[0] for v in problem.predict([Point(fit.point.common, row[None]) for row in rows])])
     if not np.all(np.isfinite(values)):
         return None
-    base, quarter, half = values[0], values[3 : 3 + count], values[3 + count :]
+    # a deviation of one standard deviation costs as much as one of the noise
+    values = np.hstack([values, np.stack(rows)[:, deviations] / widths * run.noise.scale])
+    base, *others = np.split(values, [1, 1 + len(steps), 1 + len(steps) + count])
+    stepped, quarter, half = others
     cosine = 0.5 * (base - half)
     sine = quarter - base + cosine
     waves = np.stack([cosine, sine], axis=1).reshape(2 * count, base.size)
-    return _Prediction(base - cosine.sum(axis=0), waves.T, ((values[1:3] - base) / steps[:, None]).T)
+    return _Prediction(base[0] - cosine.sum(axis=0), waves.T, (stepped - base).T, own, steps)
+
+
+def _nearer(rival: _Prediction, true: _Prediction, fit: Fit, run: RunData) -> _Prediction:
+    """The rival's prediction with the run's deviations that bring it near the true model; unchanged without any."""
+    for _ in range(_ROUNDS if fit.problem.scatter else 0):
+        step = np.linalg.lstsq(rival.slopes, _onto(true.reading, rival, run) - rival.reading, rcond=1e-10)[0]
+        again = _predict(fit, run, float(rival.own[0]), rival.own + step @ rival.steps)
+        if again is None:
+            break
+        rival = again
+    return rival
+
+
+def _onto(true: Array, rival: _Prediction, run: RunData) -> Array:
+    """Readings of the true model with zeros for the priors of the rival's deviations, in place of its own."""
+    found = np.zeros((len(rival.reading), *true.shape[1:]))
+    found[: run.reading.size] = true[: run.reading.size]
+    return found
 
 
 def _planned(fit: Fit, runs: tuple[RunData, ...], angle: float) -> tuple[Problem, Array]:
     """The problem of planned runs, and the values of a run's own parameters, shape (own,)."""
-    # one instant, whatever the number in existing runs, and no deviation, since it may have either sign
-    data = fit.problem.data.with_runs(runs)
-    problem = dataclasses.replace(fit.problem, data=data, instants=1, scatter=())
+    # one instant, whatever the number in existing runs
+    problem = dataclasses.replace(fit.problem, data=fit.problem.data.with_runs(runs), instants=1)
     first = len(problem.parameters.own) - problem.parameters.of_effects
-    start = (angle, 0.0, 0.0)[:first]
+    start = np.zeros(first)  # no deviation, since it may have either sign
+    start[0] = angle
     # samples are skipped in the middle of the run
     return problem, np.array([*start, *np.where(_turning(problem), 0.0, 0.5)])
 
@@ -372,9 +410,10 @@ def _turning(problem: Problem) -> NDArray[np.bool_]:
     return np.array([issubclass(kind, Periodic) for kind in own], bool)
 
 
-def _missed(true: _Prediction, rival: _Prediction) -> float:
+def _missed(true: _Prediction, rival: _Prediction, run: RunData) -> float:
     """Root sum of squares of the refitted rival's misfit to the true model, rad."""
-    change = np.column_stack([true.reading - rival.reading, true.waves])
+    change = _onto(np.column_stack([true.reading, true.waves]), rival, run)
+    change[:, 0] -= rival.reading
     left, waves = project_release(change, rival.slopes), project_release(rival.waves, rival.slopes)
     count = waves.shape[1] // 2
     tried = _pointers(count, _PHASES_TRIED[count])

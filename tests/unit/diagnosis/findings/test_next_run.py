@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from diagnosis.findings.next_run import FurtherRuns, NextRun, planned_run, separation
+from diagnosis.likelihood.least_squares import fit_at
 from diagnosis.likelihood.normal_equations import normal_equations
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.model.parameters import Point
 from diagnosis.search.investigate import nominal_study
+from diagnosis.search.scatter import chance, with_deviations
 from identification.show.quantity import Quantity
 from tests.support.driven_runs import driven
 from tests.support.gap_campaigns import added, campaign, nominal
@@ -141,6 +143,33 @@ def test_a_run_that_is_made_is_not_proposed_again(rivals):
     assert other.separation <= found.separation
     again = NextRun.between(beside(replace(made, duration=0.1 * found.duration)), second)
     assert (again.wind_speed, again.release_angle) == (found.wind_speed, found.release_angle)
+
+
+def test_a_difference_that_a_deviation_of_the_run_absorbs_separates_little():
+    """One per cent of the inertia is one of stiffness and one of damping: both are one standard deviation."""
+    base = nominal(campaign())
+    run = planned_run(base, spring_stiffness=16.12, wind_speed=0.0, air_density=0.0, duration=10.0)
+    width = 0.01
+    layer = [chance(base, effect_class(f"{name}_scatter"), width) for name in ("stiffness", "damping")]
+    differing = fit_at(*with_deviations(base.problem, base.point, tuple(layer)))
+
+    def heavier(one):
+        common = one.point.common.copy()
+        common[one.problem.names.index("yaw_inertia")] *= 1.0 + width
+        return replace(one, point=Point(common, one.point.per_run))
+
+    assert separation(base, heavier(base), run, 0.35) > 20.0
+    assert separation(differing, heavier(differing), run, 0.35) == pytest.approx(2.0**0.5, rel=0.05)
+    assert separation(base, heavier(differing), run, 0.35) == pytest.approx(2.0**0.5, rel=0.05)
+
+
+def test_a_misfit_of_both_models_counts_as_noise(rivals):
+    first, second = rivals
+    run = planned_run(first, spring_stiffness=16.12, wind_speed=15.0, air_density=1.2, duration=10.0)
+    least = min(one.total / one.count for one in rivals)
+    wider = [replace(one, chi2=4.0 / least * one.chi2) for one in rivals]
+    whole = separation(first, second, run, 0.35) * max(1.0, least) ** 0.5
+    assert separation(*wider, run, 0.35) == pytest.approx(0.5 * whole)
 
 
 def test_runs_without_stiffness_propose_none():
