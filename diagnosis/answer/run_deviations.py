@@ -130,6 +130,7 @@ class ScatterLimits:
 _CENTRAL = (0.05, 0.5, 0.95)  # levels of the quantiles
 _AT_MOST = 0.95  # level of a limit
 _NUMBERS = 2  # number of a run's deviations: its frequency and its damping
+_FEWEST_COMPARED = 3  # minimum number of runs to be compared with each other
 _FEWEST = 5  # minimum number of runs for an outlier or a drift
 _FEWEST_OF_PATTERN = 4  # minimum number of runs for a pattern of the plan
 _PATTERN = 0.05  # relative range of a condition that makes a pattern
@@ -162,7 +163,7 @@ class RunDeviations:
         """
         own = {one.name: one for one in fitted.problem.scatter}
         able = may_scatter(ALL_EFFECTS, fitted.problem.data)
-        if not able or not np.all(fitted.linear[:, 1:] != 0.0):
+        if len(fitted.residuals) < _FEWEST_COMPARED or not able or not np.all(fitted.linear[:, 1:] != 0.0):
             return None
         scatter = tuple(own.get(kind.name, usual(fitted, kind)) for kind in able)
         problem, point = with_deviations(*without_deviations(fitted), scatter)

@@ -39,8 +39,17 @@ _TOLERANCE = 1e-7  # drop of χ², as a share of χ², at which the answer's fit
 
 
 def may_scatter(kinds: Sequence[type[Effect]], data: Data) -> tuple[type[BetweenRuns], ...]:
-    """The differences that the runs could show: at least three runs have the quantity and a spring."""
-    return tuple(kind for kind in data.model.may_scatter(kinds) if data.acts(kind).sum() >= _FEWEST)
+    """The differences that the runs could show, or that are stated: one or two runs have them, too.
+
+    At least three runs with the quantity and a spring show them.
+    """
+    fewest = {kind: 1 if _stated(kind, data) > 0.0 else _FEWEST for kind in data.model.may_scatter(kinds)}
+    return tuple(kind for kind, least in fewest.items() if data.acts(kind).sum() >= least)
+
+
+def _stated(kind: type[BetweenRuns], data: Data) -> float:
+    """The width of a difference as the campaign states it, a fraction; 0 where it states none."""
+    return data.repeatability.get(kind.scatters, 0.0)
 
 
 def with_deviations(problem: Problem, point: Point, scatter: Scatter) -> tuple[Problem, Point]:
@@ -86,13 +95,10 @@ def as_stated(fitted: Fit, kinds: Sequence[type[Effect]]) -> Fit:
         fitted: a fit to runs that repeat exactly.
         kinds: the effects that may be named.
     """
-    data = fitted.problem.data
-    acting = (kind for kind in data.model.may_scatter(kinds) if data.acts(kind).any())
-    known = data.repeatability  # stated, and so known of two runs or one, which would not show it
-    stated = [kind for kind in acting if known.get(kind.scatters, 0.0) > 0.0]
-    if not stated:
+    widths = {kind: _stated(kind, fitted.problem.data) for kind in may_scatter(kinds, fitted.problem.data)}
+    scatter = tuple(chance(fitted, kind, width) for kind, width in widths.items() if width > 0.0)
+    if not scatter:
         return fitted
-    scatter = tuple(chance(fitted, kind, known[kind.scatters]) for kind in stated)
     return try_fit(*with_deviations(fitted.problem, fitted.point, scatter)) or fitted
 
 
@@ -103,8 +109,8 @@ def scattered(fitted: Fit, kinds: Sequence[type[Effect]]) -> Fit | None:
         fitted: a fit with the stated scatter.
         kinds: the effects that may be named.
     """
-    able = may_scatter(kinds, fitted.problem.data)
-    if not able:
+    data, able = fitted.problem.data, may_scatter(kinds, fitted.problem.data)
+    if all(data.acts(kind).sum() < _FEWEST for kind in able):
         return None
     scatter = tuple(usual(fitted, kind) for kind in able)
     problem, point = with_deviations(*without_deviations(fitted), scatter)
@@ -193,8 +199,9 @@ def shown_by(fitted: Fit) -> tuple[str, ...]:
     columns, prior = fitted.columns, width_prior(fitted.problem)
     if not _evident(columns, prior, np.ones(len(scatter), bool), chosen):
         return ()
-    shown = _shown(columns, prior, chosen)
-    return tuple(one.name for one, seen in zip(scatter, shown, strict=True) if seen)
+    shown, acts = _shown(columns, prior, chosen), fitted.problem.data.acts
+    enough = (acts(one.kind).sum() >= _FEWEST for one in scatter)
+    return tuple(one.name for one, *both in zip(scatter, shown, enough, strict=True) if all(both))
 
 
 def _shown(columns: ScatterColumns, prior: WidthPrior, chosen: ScatterSettings) -> Kept:

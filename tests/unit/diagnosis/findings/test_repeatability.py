@@ -15,10 +15,11 @@ from diagnosis.findings.units import own_repeatability
 from diagnosis.likelihood.least_squares import fit_at
 from diagnosis.model.parameters import Point
 from diagnosis.model.similarity import Similarity
-from diagnosis.search.scatter import evident, scattered
+from diagnosis.search.investigate import nominal_study
+from diagnosis.search.scatter import evident, scattered, shown_by
 from tests.support.gap_campaigns import campaign, nominal, studied
 from tunnel_sim.effects import ALL_EFFECTS
-from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.campaign import Campaign, Repeatability
 
 CONDITIONS = tuple(
     (spring, speed) for _ in range(2) for spring in (16.12, 44.84) for speed in (0.0, 15.0, 25.0)
@@ -54,6 +55,20 @@ def test_a_wind_that_drifts_over_the_campaign_is_no_chance() -> None:
     assert trend.std < 0.002
     assert trend.left < 0.002
     assert trend.p_value < 1e-3
+
+
+@pytest.mark.parametrize("windy", [1, 2])
+def test_stated_scatter_of_few_runs_with_the_wind_on_counts_and_is_not_shown(windy: int) -> None:
+    still = [(16.12, 0.0), (16.12, 0.0), (44.84, 0.0), (44.84, 0.0)]
+    data = campaign(conditions=[*still, *[(16.12, 20.0), (44.84, 20.0)][:windy]], duration=6.0)
+    stated = replace(data, repeatability=Repeatability(wind_speed=0.01, spring_stiffness=1e-4))
+    fitted = nominal_study(stated, ALL_EFFECTS).nominal
+    given = RunRepeatability.find(fitted)
+    assert given is not None
+    assert {one.effect: one.width for one in given.spreads} == {SPEED: 0.01, "stiffness_scatter": 1e-4}
+    assert set(given.spreads[0].deviations) == {run.id for run in data.runs if run.wind_speed}
+    layered = scattered(fitted, ALL_EFFECTS)
+    assert layered is None or SPEED not in shown_by(layered)
 
 
 def test_a_wind_that_follows_the_spring_is_no_chance() -> None:
