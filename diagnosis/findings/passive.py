@@ -78,8 +78,9 @@ def within_bounds(given: Mapping[str, Quantity], study: Study) -> dict[str, Quan
         std = math.inf if estimate.std is None or shared else estimate.std
         upper = _greatest(study, name)
         if upper is None:
-            if estimate.std is None or estimate.value - _FAR * std >= 0.0:
+            if estimate.std is None or estimate.value - _FAR * estimate.std >= 0.0:
                 continue
+            std = estimate.std
             upper = max(estimate.value, 0.0) + _FAR * std
         if not (estimate.value - 2.0 * std < 0.0 or estimate.value + 2.0 * std > upper) or upper <= 0.0:
             continue

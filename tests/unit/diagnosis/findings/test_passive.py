@@ -41,15 +41,29 @@ def test_an_unknown_value_is_uniform_within_its_bounds():
     assert found.interval == pytest.approx((0.3, 11.7))
 
 
-@pytest.fixture(scope="module")
-def study():
-    """A decay without a stated spring, ζ = 0.0055 in all, whose answer has an idle dry friction."""
-    settings = (Setting(16.12, 0.0), Setting(16.12, 0.0))
+def decays(*speeds):
+    """Decays without a stated spring, ζ = 0.0055 in still air, whose answer has an idle dry friction."""
+    settings = tuple(Setting(16.12, speed) for speed in speeds)
     data = campaign(settings, rng=np.random.default_rng(3), noise=5e-4, duration=6.0, rate=100.0)
     bare = replace(data, runs=tuple(replace(run, spring_stiffness=None) for run in data.runs))
     found = nominal_study(bare, [FRICTION])
     best = one_more(found.nominal, FRICTION)
     return replace(found, answers=(answer((FRICTION.name,), 0.0, 1.0, best),))
+
+
+@pytest.fixture(scope="module")
+def study():
+    return decays(0.0, 0.0)
+
+
+def test_a_damping_that_the_air_shares_is_positive_and_has_no_upper_bound():
+    """Runs at one wind speed determine only the sum of the damping and of the air's part."""
+    windy, given = decays(20.0, 20.0), Quantity(0.008, 0.3, "1")
+    assert windy.chosen.left_open is not None
+    zeta = within_bounds({"zeta": given}, windy)["zeta"]
+    truth = truncnorm(-given.value / given.std, np.inf, given.value, given.std)
+    assert zeta.interval == pytest.approx(truth.interval(0.95), rel=1e-3)
+    assert 0.5 * given.std < zeta.std <= given.std
 
 
 def test_the_deviation_of_the_damping_is_within_the_whole_rate(study):
