@@ -120,7 +120,7 @@ class _Beside:
             steady = [one for one in random_moments(seen.fit, source) if is_steady_noise(one, chosen)]
             shown = [one for one in steady if _shown_apart(one, source, seen.fit, view.prepared.kinds)]
             process = likeliest(shown, chosen)
-            if process is not None and _is_random(process, source, seen.fit):
+            if process is not None and _is_random(process, source, seen.fit, view.prepared.kinds):
                 sets = (top, *_exchanged(top, exchanges, view.able))
                 return cls((process, *_others_alike(process, shown)), sets, seen, view)
         return None
@@ -263,13 +263,19 @@ def _shows(source: MomentSource, fitted: Fit, kinds: Sequence[type[Effect]]) -> 
     return is_steady_noise(process, chosen)
 
 
-def _is_random(process: ProcessNoise, source: MomentSource, fitted: Fit) -> bool:
-    """Whether a residual is not noise of the reading, follows neither a phase nor a law, and is not inflated."""
+def _is_random(
+    process: ProcessNoise, source: MomentSource, fitted: Fit, kinds: Sequence[type[Effect]]
+) -> bool:
+    """Whether a residual is neither noise of the reading nor slow, follows no phase or law, and is not inflated.
+
+    Args:
+        kinds: the effects that may be named.
+    """
     if source.in_every_run and is_of_reading(fitted, process):
         return False
     if follows_the_motion(fitted, process.runs) or obeys_a_law(fitted, source):
         return False
-    return not is_inflated(process, fitted)
+    return not is_slow(fitted, process, source, kinds) and not is_inflated(process, fitted)
 
 
 def is_inflated(process: ProcessNoise, fitted: Fit) -> bool:

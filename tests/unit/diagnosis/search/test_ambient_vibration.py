@@ -20,6 +20,7 @@ from diagnosis.search.random_spectra import (
     STREAM,
     SURROUNDINGS,
     FloorPart,
+    MomentSource,
     SpectrumPart,
 )
 from diagnosis.search.scatter import differing
@@ -165,12 +166,14 @@ def test_a_moment_that_grows_with_the_pressure_is_buffeting() -> None:
     assert moment_of(answer).process.runs == ("r2", "r3", "r5", "r6")
 
 
-@pytest.mark.parametrize(("moment", "zero", "spring"), [(0.0, 2e-3, 0.0), (0.0, 0.0, 5e-4), (0.02, 0.0, 0.0)])
+@pytest.mark.parametrize("source", [SURROUNDINGS, STREAM])
+@pytest.mark.parametrize(("random", "zero", "spring"), [(0.0, 2e-3, 0.0), (0.0, 0.0, 5e-4), (1.0, 0.0, 0.0)])
 def test_zeros_and_springs_that_differ_are_no_random_moment(
-    moment: float, zero: float, spring: float
+    source: MomentSource, random: float, zero: float, spring: float
 ) -> None:
     """Each run swings steadily about its zero; under a random moment its amplitude and its phase wander."""
-    data, rng = shaken(campaign(), moment=moment), np.random.default_rng(2)
+    sizes = {"moment": 0.02 * random} if source is SURROUNDINGS else {"coefficient": 0.01 * random}
+    data, rng = shaken(campaign(), **sizes), np.random.default_rng(2)
     runs = [
         replace(
             run,
@@ -180,9 +183,9 @@ def test_zeros_and_springs_that_differ_are_no_random_moment(
         for run in data.runs
     ]
     fitted = nominal(replace(data, runs=tuple(runs)))
-    process = likeliest(random_moments(fitted, SURROUNDINGS), fitted.settings.moment)
+    process = likeliest(random_moments(fitted, source), fitted.settings.moment)
     assert process is not None
-    assert is_slow(fitted, process, SURROUNDINGS, ALL_EFFECTS) == (moment == 0.0)
+    assert is_slow(fitted, process, source, ALL_EFFECTS) == (random == 0.0)
 
 
 def test_a_spring_of_its_own_is_no_random_moment_and_hides_none() -> None:
