@@ -185,7 +185,11 @@ class PerInertia(SpringModel):
         return unit_per_inertia(unit)
 
     def coefficient(self, names: Sequence[str], common: Array, name: str) -> float | None:
-        """The natural frequency (rad/s) or the damping ratio of small swings; None for other names."""
+        """The natural frequency (rad/s) or the damping ratio of small swings.
+
+        Returns:
+            Another parameter for its name; None where the model has none, and for the ratio if nothing restores.
+        """
         value = dict(zip(names, common.tolist(), strict=True))
         if name not in self.coefficient_units:
             return value.get(name)
@@ -196,7 +200,9 @@ class PerInertia(SpringModel):
             given |= {one.rpartition(".")[2]: value[one] for one in own}
             stiffness, damping = kind.small_swings(stiffness, damping, given)
         omega = float(np.sqrt(stiffness))
-        return omega if name == "omega_n" else damping / max(2.0 * omega, 1e-150)
+        if name == "omega_n":
+            return omega
+        return damping / (2.0 * omega) if omega > 0.0 else None  # nothing swings
 
     def gradient(self, names: Sequence[str], common: Array, name: str) -> Array:
         """Derivative of a coefficient with respect to the common parameters, shape (common,)."""

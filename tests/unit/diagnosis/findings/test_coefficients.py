@@ -49,6 +49,20 @@ def best(base):
     return added(base, CAUSE)
 
 
+def test_an_answer_in_which_nothing_swings_has_no_damping_ratio():
+    """An unstated spring may end at zero in a fit of an improbable answer."""
+    data = campaign(conditions=((16.12, 0.0), (16.12, 20.0)), duration=6.0)
+    fitted = nominal(replace(data, runs=tuple(replace(run, spring_stiffness=None) for run in data.runs)))
+    common = fitted.point.common.copy()
+    common[fitted.problem.names.index("stiffness")] = 0.0
+    loose = replace(fitted, point=replace(fitted.point, common=common))
+    found = coefficients(Answers((Possible(0.99, fitted), Possible(0.01, loose)), 0.0, fitted), data)
+    alone = only(fitted, data)
+    assert found["zeta"].value == pytest.approx(alone["zeta"].value)
+    assert found["zeta"].std == pytest.approx(alone["zeta"].std)
+    assert "zeta" not in only(loose, data)
+
+
 @given(PARTS)
 @settings(max_examples=50)
 def test_a_mixture_has_the_moments_of_its_samples_and_the_quantiles_of_its_distribution(parts):
