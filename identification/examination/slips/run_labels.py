@@ -1,15 +1,14 @@
 """A wind speed or spring of single runs that contradicts the other runs, and the value that would agree.
 
-Each possible slip of one label is a `Label`. The table `LABELS` lists them; a new slip is a class and a line in it.
+Each possible slip of one label is a `Label`. The table `LABELS` lists them; a new slip is a line in it.
 """
 
 from __future__ import annotations
 
 import itertools
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import ClassVar, Literal
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from scipy.special import chdtri
@@ -36,42 +35,36 @@ _DECIMAL = {
 }
 
 
-class Label(ABC):
-    """A slip in one label, and the values that may have been meant.
-
-    Attributes:
-        key: which label.
-        repeats: whether several runs at once may have the slip, as with a wrong unit.
-    """
-
-    key: ClassVar[Key]
-    repeats: ClassVar[bool] = True
-
-    @abstractmethod
-    def meant(self, value: float, others: Sequence[float]) -> Iterator[tuple[float, str]]:
-        """Values that may have been meant by a stated value, each with words for its origin.
-
-        Args:
-            value: stated value, in the unit of the label.
-            others: values of the other runs, in that unit.
-        """
+Meant = Callable[[float, Sequence[float]], Iterator[tuple[float, str]]]
 
 
 @dataclass(frozen=True)
-class InAnotherUnit(Label):
-    """The value in another unit, or its decimal point elsewhere.
+class Label:
+    """A slip in one label.
+
+    Args:
+        key: which label.
+        meant: function from the stated value and the values of the other runs, in the unit of the label, to the
+            values that may have been meant, each with words for its origin.
+        repeats: whether several runs at once may have the slip, as with a wrong unit.
+    """
+
+    key: Key
+    meant: Meant
+    repeats: bool = True
+
+
+def _over(factors: Mapping[str, float]) -> Meant:
+    """The value in another unit, or with its decimal point elsewhere; 0 has no unit.
 
     Args:
         factors: the stated value over the intended one, by words that follow "as".
     """
 
-    factors: Mapping[str, float] = field(default_factory=dict)
+    def meant(value: float, _others: Sequence[float]) -> Iterator[tuple[float, str]]:
+        yield from ((value / factor, words) for words, factor in factors.items() if value > 0.0)
 
-    def meant(self, value: float, others: Sequence[float]) -> Iterator[tuple[float, str]]:  # noqa: ARG002
-        """The value over each factor; 0 has no unit."""
-        for words, factor in self.factors.items():
-            if value > 0.0:
-                yield value / factor, words
+    return meant
 
 
 def _both_ways(factors: Mapping[str, float], unit: str) -> Mapping[str, float]:
@@ -80,128 +73,50 @@ def _both_ways(factors: Mapping[str, float], unit: str) -> Mapping[str, float]:
     return {**factors, **others}
 
 
-@dataclass(frozen=True)
-class SpeedInAnotherUnit(InAnotherUnit):
-    """A speed in km/h, knots, mph or ft/s, or in m/s if the others are in one of these."""
-
-    key: ClassVar[Key] = "speed"
-    factors: Mapping[str, float] = field(
-        default_factory=lambda: _both_ways(
-            {"in km/h": 3.6, "in knots": 1.9438, "in mph": 2.2369, "in ft/s": 3.2808}, "in m/s"
-        )
-    )
+def _as_in_another_run(value: float, others: Sequence[float]) -> Iterator[tuple[float, str]]:
+    """Each clearly different value of the other runs."""
+    for other in dict.fromkeys(others):
+        if other > 0.0 and abs(other - value) > policy.LEAST_SPRING_SPREAD * max(other, value):
+            yield other, "as in other runs"
 
 
-@dataclass(frozen=True)
-class SpeedDecimal(InAnotherUnit):
-    """A speed with its decimal point one place off."""
-
-    key: ClassVar[Key] = "speed"
-    factors: Mapping[str, float] = field(default_factory=lambda: _DECIMAL)
+def _without_wind(value: float, _others: Sequence[float]) -> Iterator[tuple[float, str]]:
+    """No wind, although a speed is stated."""
+    if value > 0.0:
+        yield 0.0, "with the wind off"
 
 
-@dataclass(frozen=True)
-class SpringInAnotherUnit(InAnotherUnit):
-    """A stiffness in N mm/rad, N cm/rad, N m/deg, kgf m/rad or lbf in/rad, or in N m/rad if the others are not."""
-
-    key: ClassVar[Key] = "spring"
-    factors: Mapping[str, float] = field(
-        default_factory=lambda: _both_ways(
-            {
-                "in N mm/rad": 1e3,
-                "in N cm/rad": 1e2,
-                "in N m/deg": 1.0 / 57.2958,
-                "in kgf m/rad": 1.0 / 9.80665,
-                "in lbf in/rad": 8.8507,
-            },
-            "in N m/rad",
-        )
-    )
-
-
-@dataclass(frozen=True)
-class SpringDecimal(InAnotherUnit):
-    """A stiffness with its decimal point one place off."""
-
-    key: ClassVar[Key] = "spring"
-    factors: Mapping[str, float] = field(default_factory=lambda: _DECIMAL)
-
-
-@dataclass(frozen=True)
-class DensityDecimal(InAnotherUnit):
-    """An air density with its decimal point one place off."""
-
-    key: ClassVar[Key] = "density"
-    factors: Mapping[str, float] = field(default_factory=lambda: _DECIMAL)
-
-
-@dataclass(frozen=True)
-class TimeInAnotherUnit(Label):
-    """Times in minutes or milliseconds, or of a run sampled at another rate than the others."""
-
-    key: ClassVar[Key] = "clock"
-
-    def meant(self, value: float, others: Sequence[float]) -> Iterator[tuple[float, str]]:  # noqa: ARG002
-        """The stamped times over the true times."""
-        yield value / 60.0, "in minutes"
-        yield value * 60.0, "in seconds, the others in minutes"
-        yield value * 1e3, "in milliseconds"
-        yield value / 1e3, "in seconds, the others in milliseconds"
-        for rate in (2.0, 4.0, 5.0, 10.0):
-            yield value * rate, f"of a run sampled {rate:g} times as fast as stated"
-            yield value / rate, f"of a run sampled {rate:g} times as slowly as stated"
-
-
-@dataclass(frozen=True)
-class OfAnotherRun(Label):
-    """A label that belongs to another run of the campaign."""
-
-    repeats: ClassVar[bool] = False
-
-    def meant(self, value: float, others: Sequence[float]) -> Iterator[tuple[float, str]]:
-        """Each clearly different value of the other runs."""
-        for other in dict.fromkeys(others):
-            if other > 0.0 and abs(other - value) > policy.LEAST_SPRING_SPREAD * max(other, value):
-                yield other, "as in other runs"
-
-
-@dataclass(frozen=True)
-class SpeedOfAnotherRun(OfAnotherRun):
-    """The wind speed of another setting."""
-
-    key: ClassVar[Key] = "speed"
-
-
-@dataclass(frozen=True)
-class SpringOfAnotherRun(OfAnotherRun):
-    """The stiffness of another spring."""
-
-    key: ClassVar[Key] = "spring"
-
-
-@dataclass(frozen=True)
-class WindOff(Label):
-    """A stated speed although the wind was off."""
-
-    key: ClassVar[Key] = "speed"
-    repeats: ClassVar[bool] = False
-
-    def meant(self, value: float, others: Sequence[float]) -> Iterator[tuple[float, str]]:  # noqa: ARG002
-        """No wind."""
-        if value > 0.0:
-            yield 0.0, "with the wind off"
-
+_SPEEDS = {"in km/h": 3.6, "in knots": 1.9438, "in mph": 2.2369, "in ft/s": 3.2808}
+_STIFFNESSES = {
+    "in N mm/rad": 1e3,
+    "in N cm/rad": 1e2,
+    "in N m/deg": 1.0 / 57.2958,
+    "in kgf m/rad": 1.0 / 9.80665,
+    "in lbf in/rad": 8.8507,
+}
+#: The stamped times over the true ones.
+_CLOCKS = {
+    "in minutes": 60.0,
+    "in seconds, the others in minutes": 1.0 / 60.0,
+    "in milliseconds": 1e-3,
+    "in seconds, the others in milliseconds": 1e3,
+    **{
+        f"of a run sampled {rate:g} times as {how} as stated": factor
+        for rate in (2.0, 4.0, 5.0, 10.0)
+        for how, factor in (("fast", 1.0 / rate), ("slowly", rate))
+    },
+}
 
 LABELS: tuple[Label, ...] = (
-    SpeedInAnotherUnit(),
-    SpeedDecimal(),
-    SpeedOfAnotherRun(),
-    WindOff(),
-    SpringOfAnotherRun(),
-    SpringDecimal(),
-    SpringInAnotherUnit(),
-    DensityDecimal(),
-    TimeInAnotherUnit(),
+    Label("speed", _over(_both_ways(_SPEEDS, "in m/s"))),
+    Label("speed", _over(_DECIMAL)),
+    Label("speed", _as_in_another_run, repeats=False),
+    Label("speed", _without_wind, repeats=False),
+    Label("spring", _as_in_another_run, repeats=False),
+    Label("spring", _over(_DECIMAL)),
+    Label("spring", _over(_both_ways(_STIFFNESSES, "in N m/rad"))),
+    Label("density", _over(_DECIMAL)),
+    Label("clock", _over(_CLOCKS)),
 )
 
 
