@@ -13,12 +13,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from identification.examination.examine import measured
-from identification.examination.slips.compared_labels import InertiaOffTheSprings, SpringOffTheLine
+from identification.examination.slips.compared_labels import inertia_off_the_springs, spring_off_the_line
 from identification.examination.slips.table import RECORD_SLIPS, STATEMENT_SLIPS
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
 
-NOT_SLIPS = {SpringOffTheLine.__name__, InertiaOffTheSprings.__name__}
+NOT_SLIPS = {spring_off_the_line.__name__, inertia_off_the_springs.__name__}
 """Slips that may also be effects."""
 
 
@@ -42,10 +42,10 @@ class Count:
 
 def questioned_by(campaign: Campaign) -> tuple[str, ...]:
     """Names of the slips that question a campaign."""
-    found = [type(slip).__name__ for slip in RECORD_SLIPS if slip.mend(campaign)[1]]
+    found = [slip.__name__ for slip in RECORD_SLIPS if slip(campaign)[1]]
     seen = measured(campaign)[2]
     if seen is not None:
-        found += [type(slip).__name__ for slip in STATEMENT_SLIPS if slip.find(seen)]
+        found += [slip.__name__ for slip in STATEMENT_SLIPS if slip(seen)]
     return tuple(found)
 
 

@@ -6,7 +6,7 @@ wind on a run may excite itself: its motion grows, or is a limit cycle.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -128,23 +128,6 @@ def _poles(reading: Reading, omega: float) -> PencilDecay | None:
     """The oscillation of a part of a record; None if its poles do not describe an oscillation."""
     found = pencil_decay(reading.yaw, float(reading.time[-1]) / (reading.time.size - 1), omega)
     return found if found is not None and found.decay.omega_d > 0.0 else None
-
-
-def growing_runs(swings: Sequence[Swing]) -> tuple[Remark, ...]:
-    """Refuse wind-off runs that grow: their decay rate is negative beyond chance, and their swings become larger.
-
-    A blow in mid-record does not show both.
-    """
-    ids = []
-    for swing in swings:
-        if swing.run.wind_on or swing.rate + policy.REFUSAL_DEVIATIONS * swing.rate_std >= 0.0:
-            continue
-        quarters = [float(part @ part) / max(part.size, 1) for part in np.array_split(swing.motion, 4)]
-        if quarters[3] > quarters[2] > max(quarters[0], quarters[1]):
-            ids.append(swing.run.id)
-    what = "the motion grows with the wind off, which is impossible on a passive rig"
-    remedy = "check whether time runs backwards in the file, state the wind speed, or remove the run"
-    return (Remark(Outcome.REFUSED, tuple(ids), what, remedy),) if ids else ()
 
 
 _CYCLES = 3.0  # cycles of the strongest oscillation in a window

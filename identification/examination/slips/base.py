@@ -1,21 +1,17 @@
-"""The types of slips, each with a test, a sentence and a remedy."""
+"""A slip is a function of the records, or of the evidence of the measured oscillations."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from identification.examination.self_excited import Swing
 from identification.status import Remark
 from tunnel_sim.vocabulary.campaign import Campaign
 
-
-class RecordSlip(ABC):
-    """A fault of the records that they show before any measurement."""
-
-    @abstractmethod
-    def mend(self, campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
-        """The campaign without the fault, with a remark on each action, or on a fault that cannot be mended."""
+RecordSlip = Callable[[Campaign], tuple[Campaign, tuple[Remark, ...]]]
+"""A fault of the records, before any measurement: from a campaign to the campaign without the fault, with a remark
+on each change, or on a fault that cannot be mended."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,9 +29,5 @@ class SlipEvidence:
     swings: tuple[Swing, ...]
 
 
-class StatementSlip(ABC):
-    """A statement that the measured oscillations contradict."""
-
-    @abstractmethod
-    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
-        """A remark for each contradicted statement; none if all may be right."""
+StatementSlip = Callable[[SlipEvidence], tuple[Remark, ...]]
+"""A contradicted statement: from the evidence to a remark for each, none if all statements may be right."""

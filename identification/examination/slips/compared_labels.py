@@ -20,7 +20,7 @@ from scipy.special import chdtri, fdtri, ndtri
 
 from identification import policy
 from identification.examination.self_excited import Swing
-from identification.examination.slips.base import SlipEvidence, StatementSlip
+from identification.examination.slips.base import SlipEvidence
 from identification.status import WITHHOLDS, Outcome, Remark
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.vocabulary.record import Array
@@ -73,40 +73,34 @@ class _Misfit:
         return self.squares <= float(chdtri(self.freedom, policy.MISFIT_RATE))
 
 
-@dataclass(frozen=True)
-class LabelsExchanged(StatementSlip):
+def labels_exchanged(evidence: SlipEvidence) -> tuple[Remark, ...]:
     """Springs or wind speeds of two runs, or of all runs of two settings, are exchanged. Refused."""
-
-    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
-        """Exchange the labels of badly fitting runs with all others' labels."""
-        known = [swing for swing in evidence.swings if swing.run.spring_stiffness is not None]
-        if len(known) < _LEAST_RUNS:
-            return ()
-        labels = Labels.of(known)
-        for what in (_SPRINGS, "wind_speed"):
-            stated, away = _misfit(labels, what)
-            if not (
-                stated.freedom > 0 and stated.squares > float(chdtri(stated.freedom, policy.REFUSAL_RATE))
-            ):
-                continue
-            trials = [(places, _misfit(other, what)[0]) for places, other in _exchanged(labels, away, what)]
-            mended = []  # exchanges that agree, or agree better than the statements beyond chance
-            for places, found in trials:
-                ratio, freedom = stated.squares / max(found.squares, 1e-300), found.freedom
-                if found.agrees or ratio > float(
-                    fdtri(freedom, freedom, 1.0 - policy.REFUSAL_RATE / len(trials))
-                ):
-                    mended.append((places, found))
-            if not mended:
-                continue
-            # Exchanges that fit as well as the best one cannot be distinguished.
-            limit = min(found.squares for _, found in mended) + float(chdtri(1, policy.MISFIT_RATE))
-            names = [[known[i].run.id for i in places] for places, found in mended if found.squares <= limit]
-            ids = tuple(dict.fromkeys(itertools.chain.from_iterable(names)))
-            pairs = ", or ".join(" and ".join(pair) for pair in names)
-            said = f"the stated {what} contradicts the frequencies, but agrees if {pairs} are exchanged"
-            return (Remark(Outcome.REFUSED, ids, said, f"correct {what} or the file names of these runs"),)
+    known = [swing for swing in evidence.swings if swing.run.spring_stiffness is not None]
+    if len(known) < _LEAST_RUNS:
         return ()
+    labels = Labels.of(known)
+    for what in (_SPRINGS, "wind_speed"):
+        stated, away = _misfit(labels, what)
+        if not (stated.freedom > 0 and stated.squares > float(chdtri(stated.freedom, policy.REFUSAL_RATE))):
+            continue
+        trials = [(places, _misfit(other, what)[0]) for places, other in _exchanged(labels, away, what)]
+        mended = []  # exchanges that agree, or agree better than the statements beyond chance
+        for places, found in trials:
+            ratio, freedom = stated.squares / max(found.squares, 1e-300), found.freedom
+            if found.agrees or ratio > float(
+                fdtri(freedom, freedom, 1.0 - policy.REFUSAL_RATE / len(trials))
+            ):
+                mended.append((places, found))
+        if not mended:
+            continue
+        # Exchanges that fit as well as the best one cannot be distinguished.
+        limit = min(found.squares for _, found in mended) + float(chdtri(1, policy.MISFIT_RATE))
+        names = [[known[i].run.id for i in places] for places, found in mended if found.squares <= limit]
+        ids = tuple(dict.fromkeys(itertools.chain.from_iterable(names)))
+        pairs = ", or ".join(" and ".join(pair) for pair in names)
+        said = f"the stated {what} contradicts the frequencies, but agrees if {pairs} are exchanged"
+        return (Remark(Outcome.REFUSED, ids, said, f"correct {what} or the file names of these runs"),)
+    return ()
 
 
 def _other_fits(swings: Sequence[Swing]) -> list[tuple[float, float | None]]:
@@ -278,39 +272,34 @@ class _Springs:
         return float(away @ away) > float(chdtri(self.stiffness.size - 1, policy.MISFIT_RATE))
 
 
-@dataclass(frozen=True)
-class SpringsRenumbered(StatementSlip):
+def springs_renumbered(evidence: SlipEvidence) -> tuple[Remark, ...]:
     """All springs are one number off, in the campaign's own order or in the packaged list. Refused."""
-
-    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
-        """Take each spring for its neighbour in a list, unless the campaign states that its values are right."""
-        if evidence.campaign.sensor.plausible is False:
-            return ()
-        still = [s for s in evidence.swings if not s.run.wind_on and s.run.spring_stiffness is not None]
-        stated = _Springs.of(still)
-        if stated.stiffness.size < 2 or np.ptp(stated.inertia) < np.log1p(policy.OTHER_NUMBER):
-            return ()
-        own = sorted({float(s.run.spring_stiffness or 0.0) for s in evidence.swings})
-        for table in (np.array(list(load_rig().springs.values())), np.array(own)):
-            places = [
-                np.flatnonzero(np.abs(table / value - 1.0) < policy.SPRING_AT_BEST)
-                for value in stated.stiffness
-            ]
-            if any(place.size != 1 for place in places):
-                continue
-            number = np.array([int(place[0]) for place in places])
-            for shift in (-1, 1):
-                inside = (number + shift >= 0) & (number + shift < table.size)
-                meant = table[(number + shift)[inside]]
-                known = int(np.sum(inside))
-                if known < 2 or (known == 2 and not np.all(inside)):
-                    continue  # two springs of three may agree by chance
-                inertia = stated.inertia[inside] + np.log(meant / stated.stiffness[inside])
-                std = np.hypot(stated.std[inside], policy.SPRING_AT_BEST)
-                away = inertia - np.average(inertia, weights=std**-2)
-                if float(np.sum((away / std) ** 2)) <= float(chdtri(known - 1, policy.SLIP_AGREES)):
-                    return (_renumbered(stated, inside, meant, shift),)
+    if evidence.campaign.sensor.plausible is False:
         return ()
+    still = [s for s in evidence.swings if not s.run.wind_on and s.run.spring_stiffness is not None]
+    stated = _Springs.of(still)
+    if stated.stiffness.size < 2 or np.ptp(stated.inertia) < np.log1p(policy.OTHER_NUMBER):
+        return ()
+    own = sorted({float(s.run.spring_stiffness or 0.0) for s in evidence.swings})
+    for table in (np.array(list(load_rig().springs.values())), np.array(own)):
+        places = [
+            np.flatnonzero(np.abs(table / value - 1.0) < policy.SPRING_AT_BEST) for value in stated.stiffness
+        ]
+        if any(place.size != 1 for place in places):
+            continue
+        number = np.array([int(place[0]) for place in places])
+        for shift in (-1, 1):
+            inside = (number + shift >= 0) & (number + shift < table.size)
+            meant = table[(number + shift)[inside]]
+            known = int(np.sum(inside))
+            if known < 2 or (known == 2 and not np.all(inside)):
+                continue  # two springs of three may agree by chance
+            inertia = stated.inertia[inside] + np.log(meant / stated.stiffness[inside])
+            std = np.hypot(stated.std[inside], policy.SPRING_AT_BEST)
+            away = inertia - np.average(inertia, weights=std**-2)
+            if float(np.sum((away / std) ** 2)) <= float(chdtri(known - 1, policy.SLIP_AGREES)):
+                return (_renumbered(stated, inside, meant, shift),)
+    return ()
 
 
 def _renumbered(stated: _Springs, inside: NDArray[np.bool_], meant: Array, shift: int) -> Remark:
@@ -329,78 +318,68 @@ def _renumbered(stated: _Springs, inside: NDArray[np.bool_], meant: Array, shift
     return Remark(Outcome.REFUSED, tuple(name for group in stated.runs for name in group), what, remedy)
 
 
-@dataclass(frozen=True)
-class SpringOffTheLine(StatementSlip):
+def spring_off_the_line(evidence: SlipEvidence) -> tuple[Remark, ...]:
     """A spring that is not as stiff as stated, according to the others. Noted."""
-
-    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
-        """Compare the stated stiffnesses with the wind-off frequencies, within the tolerance of springs.
-
-        One remark: on the wrong spring if at least three springs identify it, else on all of them.
-        """
-        still = [s for s in evidence.swings if not s.run.wind_on and s.run.spring_stiffness is not None]
-        if len({s.run.spring_stiffness for s in still}) < 2:
-            return ()
-        springs = _Springs.of(still)
-        if not springs.disagree():
-            return ()
-        fits = _other_fits(evidence.swings)
-        figures = {"inertias_kg_m2": [one for one, _ in fits], "air_stiffnesses_m3": [air for _, air in fits]}
-        # the spring that differs beyond chance while the others agree
-        count, scores = springs.stiffness.size, []
-        for place in range(count if count >= _LEAST else 0):
-            rest = springs.without(place)
-            mean, std = rest.mean()
-            score = abs(springs.inertia[place] - mean) / float(np.hypot(std, springs.std[place]))
-            scores.append(-1.0 if rest.disagree() else score)
-        if scores and max(scores) > float(-ndtri(0.5 * policy.MISFIT_RATE / count)):
-            place = int(np.argmax(scores))
-            percent = 100.0 * np.expm1(springs.without(place).mean()[0] - springs.inertia[place])
-            how = f"{abs(percent):.0f} % {'stiffer' if percent > 0.0 else 'softer'}"
-            what = (
-                f"their spring appears {how} than the stated {springs.stiffness[place]:g} N m/rad, judged by the "
-                f"frequencies of the other springs"
-            )
-            remedy = "calibrate that spring again; a tilted axis or a flexible rod looks similar, run the diagnosis"
-            return (Remark(Outcome.NOTED, springs.runs[place], what, remedy, figures),)
-        spread = 100.0 * np.expm1(float(np.ptp(springs.inertia)))
-        ids = tuple(name for group in springs.runs for name in group)
+    still = [s for s in evidence.swings if not s.run.wind_on and s.run.spring_stiffness is not None]
+    if len({s.run.spring_stiffness for s in still}) < 2:
+        return ()
+    springs = _Springs.of(still)
+    if not springs.disagree():
+        return ()
+    fits = _other_fits(evidence.swings)
+    figures = {"inertias_kg_m2": [one for one, _ in fits], "air_stiffnesses_m3": [air for _, air in fits]}
+    # the spring that differs beyond chance while the others agree
+    count, scores = springs.stiffness.size, []
+    for place in range(count if count >= _LEAST else 0):
+        rest = springs.without(place)
+        mean, std = rest.mean()
+        score = abs(springs.inertia[place] - mean) / float(np.hypot(std, springs.std[place]))
+        scores.append(-1.0 if rest.disagree() else score)
+    if scores and max(scores) > float(-ndtri(0.5 * policy.MISFIT_RATE / count)):
+        place = int(np.argmax(scores))
+        percent = 100.0 * np.expm1(springs.without(place).mean()[0] - springs.inertia[place])
+        how = f"{abs(percent):.0f} % {'stiffer' if percent > 0.0 else 'softer'}"
         what = (
-            f"with the wind off Kr/omega_n^2 differs by {spread:.0f} % between the stated springs; which one is "
-            "wrong cannot be determined"
+            f"their spring appears {how} than the stated {springs.stiffness[place]:g} N m/rad, judged by the "
+            f"frequencies of the other springs"
         )
         remedy = (
-            "calibrate the springs again; a tilted axis or a flexible rod looks similar, run the diagnosis"
+            "calibrate that spring again; a tilted axis or a flexible rod looks similar, run the diagnosis"
         )
-        return (Remark(Outcome.NOTED, ids, what, remedy, figures),)
+        return (Remark(Outcome.NOTED, springs.runs[place], what, remedy, figures),)
+    spread = 100.0 * np.expm1(float(np.ptp(springs.inertia)))
+    ids = tuple(name for group in springs.runs for name in group)
+    what = (
+        f"with the wind off Kr/omega_n^2 differs by {spread:.0f} % between the stated springs; which one is "
+        "wrong cannot be determined"
+    )
+    remedy = "calibrate the springs again; a tilted axis or a flexible rod looks similar, run the diagnosis"
+    return (Remark(Outcome.NOTED, ids, what, remedy, figures),)
 
 
-@dataclass(frozen=True)
-class InertiaOffTheSprings(StatementSlip):
-    """A stated inertia that the springs contradict. Noted."""
+def inertia_off_the_springs(evidence: SlipEvidence) -> tuple[Remark, ...]:
+    """A stated inertia that the springs contradict. Noted.
 
-    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
-        """Compare the stated inertia with the wind-off runs'; a nominal inertia may be slightly wrong.
-
-        The remark names the probable error of units; there is none where the campaign states ``plausible = false``.
-        """
-        campaign = evidence.campaign
-        still = [s for s in evidence.swings if not s.run.wind_on and s.run.spring_stiffness is not None]
-        stated = campaign.rig.yaw_inertia
-        if stated is None or not still or campaign.sensor.plausible is False:
-            return ()
-        found = float(np.exp(_Springs.of(still).mean()[0]))
-        off = {ratio: abs(np.log(found / stated / ratio)) for ratio in (1.0, *_SLIPS)}
-        if off[1.0] <= np.log(policy.INERTIA_FACTOR):
-            return ()
-        nearest = min(_SLIPS, key=off.__getitem__)
-        slip = f": it looks like {_SLIPS[nearest]}" if off[nearest] <= np.log(policy.INERTIA_FACTOR) else ""
-        what = (
-            f"with the wind off Kr/omega_n^2 is {found:.4g} kg m2, {found / stated:.4g} times the stated "
-            f"yaw_inertia of {stated:.4g} kg m2{slip}"
-        )
-        remedy = "correct the stiffness, the inertia or the times, or state plausible = false under [sensor]"
-        figures: dict[str, Any] = {"inertias_kg_m2": [stated], "air_stiffnesses_m3": [None]}
-        if abs(np.log(found / stated)) > np.log(policy.WITHHELD_INERTIA):
-            figures[WITHHOLDS] = True
-        return (Remark(Outcome.NOTED, tuple(s.run.id for s in still), what, remedy, figures),)
+    A nominal inertia may be slightly wrong. The remark names the probable error of units; there is none where the
+    campaign states ``plausible = false``.
+    """
+    campaign = evidence.campaign
+    still = [s for s in evidence.swings if not s.run.wind_on and s.run.spring_stiffness is not None]
+    stated = campaign.rig.yaw_inertia
+    if stated is None or not still or campaign.sensor.plausible is False:
+        return ()
+    found = float(np.exp(_Springs.of(still).mean()[0]))
+    off = {ratio: abs(np.log(found / stated / ratio)) for ratio in (1.0, *_SLIPS)}
+    if off[1.0] <= np.log(policy.INERTIA_FACTOR):
+        return ()
+    nearest = min(_SLIPS, key=off.__getitem__)
+    slip = f": it looks like {_SLIPS[nearest]}" if off[nearest] <= np.log(policy.INERTIA_FACTOR) else ""
+    what = (
+        f"with the wind off Kr/omega_n^2 is {found:.4g} kg m2, {found / stated:.4g} times the stated "
+        f"yaw_inertia of {stated:.4g} kg m2{slip}"
+    )
+    remedy = "correct the stiffness, the inertia or the times, or state plausible = false under [sensor]"
+    figures: dict[str, Any] = {"inertias_kg_m2": [stated], "air_stiffnesses_m3": [None]}
+    if abs(np.log(found / stated)) > np.log(policy.WITHHELD_INERTIA):
+        figures[WITHHOLDS] = True
+    return (Remark(Outcome.NOTED, tuple(s.run.id for s in still), what, remedy, figures),)

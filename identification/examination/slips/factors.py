@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import chdtri, fdtri
 
 from identification import policy
-from identification.examination.slips.base import SlipEvidence, StatementSlip
+from identification.examination.slips.base import SlipEvidence
 from identification.examination.slips.motions import (
     ConditionsFit,
     MeasuredMotions,
@@ -42,24 +42,22 @@ _ROUNDED = "spring_stiffness, rounded"
 _KINDS = {"speed": "wind_speed", "density": "air_density", "clock": "time_s", "spring": "spring_stiffness"}
 
 
-@dataclass(frozen=True)
-class WrongFactor(StatementSlip):
+def wrong_factor(evidence: SlipEvidence) -> tuple[Remark, ...]:
     """One factor on a speed, a density, a spring or a clock makes all runs agree, and no effect does.
 
     Refused, or asked about where the evidence is weaker.
-    """
 
-    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
-        """Try factors on every run, on groups and along the campaign; labels that agree equally well come first."""
-        swings = [s for s in evidence.swings if s.run.spring_stiffness and s.rate > 0.0 and s.stiffness > 0.0]
-        if len(swings) < _FEWEST:
-            return ()
-        motions = MeasuredMotions.of(swings)
-        found = _agreeing(motions)
-        best = min(found, key=lambda one: one.fit.squares(one.level), default=None)
-        if best is None or _labels_agree(evidence, motions, best):
-            return ()
-        return _said(motions, found)
+    Labels that agree equally well come first.
+    """
+    swings = [s for s in evidence.swings if s.run.spring_stiffness and s.rate > 0.0 and s.stiffness > 0.0]
+    if len(swings) < _FEWEST:
+        return ()
+    motions = MeasuredMotions.of(swings)
+    found = _agreeing(motions)
+    best = min(found, key=lambda one: one.fit.squares(one.level), default=None)
+    if best is None or _labels_agree(evidence, motions, best):
+        return ()
+    return _said(motions, found)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ from scipy.special import chdtri, fdtri
 
 from identification import policy
 from identification.examination.self_excited import Swing
-from identification.examination.slips.base import SlipEvidence, StatementSlip
+from identification.examination.slips.base import SlipEvidence
 from identification.signal.free_decay import Decay, response_rows
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.quantities import Angles
@@ -41,8 +41,7 @@ class _Phase:
     free: Array
 
 
-@dataclass(frozen=True)
-class DriftingClock(StatementSlip):
+def drifting_clock(evidence: SlipEvidence) -> tuple[Remark, ...]:
     """All runs, or a single one, change their frequency linearly with time, not with the amplitude. Refused.
 
     An effect changes the frequency with the amplitude, which falls faster in runs of greater damping. The phase
@@ -51,36 +50,33 @@ class DriftingClock(StatementSlip):
 
     A single run with a phase that may as well jump at one instant is not refused: it may have been disturbed.
     """
-
-    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
-        """Fit a drift of the clock, and powers of the amplitude, to the phases of all free decays of angles."""
-        phases = [phase for swing in evidence.swings if (phase := _phase(swing)) is not None]
-        still = {swing.run.id for swing in evidence.swings if not swing.run.wind_on}
-        # one decay does not separate time from amplitude, and without wind-off runs the wind speed may drift
-        if len(phases) < 2 or not any(phase.run in still for phase in phases):
-            return ()
-        whole = tuple(range(len(phases)))
-        for places in (whole, *((place,) for place in whole if len(phases) > 2)):
-            drift, std, squares, freedom = _fitted_drift(phases, places, by_amplitude=False)
-            if abs(drift) < policy.LEAST_DRIFT or abs(drift) < policy.REFUSAL_DEVIATIONS * std:
-                continue
-            good = squares <= float(chdtri(freedom, policy.MISFIT_RATE))
-            _, _, other, left = _fitted_drift(phases, (), by_amplitude=True)
-            ratio = (other / left) / max(squares / freedom, 1.0)
-            if not good or ratio <= float(fdtri(left, freedom, 1.0 - policy.REFUSAL_RATE)):
-                continue
-            if places != whole and _jumps(phases, places[0], squares):
-                continue
-            ids = tuple(phases[place].run for place in places)
-            who = "every run" if places == whole else "the run"
-            air = "" if still.intersection(ids) else ", or the wind speed"
-            what = (
-                f"the frequency changes by {100.0 * drift:+.2g} % along {who} with time, at every amplitude: "
-                f"the clock of the logger drifts, or the stiffness of a spring that warms up{air}"
-            )
-            remedy = "correct time_s by a reference, let the spring settle, or leave the runs out"
-            return (Remark(Outcome.REFUSED, ids, what, remedy),)
+    phases = [phase for swing in evidence.swings if (phase := _phase(swing)) is not None]
+    still = {swing.run.id for swing in evidence.swings if not swing.run.wind_on}
+    # one decay does not separate time from amplitude, and without wind-off runs the wind speed may drift
+    if len(phases) < 2 or not any(phase.run in still for phase in phases):
         return ()
+    whole = tuple(range(len(phases)))
+    for places in (whole, *((place,) for place in whole if len(phases) > 2)):
+        drift, std, squares, freedom = _fitted_drift(phases, places, by_amplitude=False)
+        if abs(drift) < policy.LEAST_DRIFT or abs(drift) < policy.REFUSAL_DEVIATIONS * std:
+            continue
+        good = squares <= float(chdtri(freedom, policy.MISFIT_RATE))
+        _, _, other, left = _fitted_drift(phases, (), by_amplitude=True)
+        ratio = (other / left) / max(squares / freedom, 1.0)
+        if not good or ratio <= float(fdtri(left, freedom, 1.0 - policy.REFUSAL_RATE)):
+            continue
+        if places != whole and _jumps(phases, places[0], squares):
+            continue
+        ids = tuple(phases[place].run for place in places)
+        who = "every run" if places == whole else "the run"
+        air = "" if still.intersection(ids) else ", or the wind speed"
+        what = (
+            f"the frequency changes by {100.0 * drift:+.2g} % along {who} with time, at every amplitude: "
+            f"the clock of the logger drifts, or the stiffness of a spring that warms up{air}"
+        )
+        remedy = "correct time_s by a reference, let the spring settle, or leave the runs out"
+        return (Remark(Outcome.REFUSED, ids, what, remedy),)
+    return ()
 
 
 def _jumps(phases: list[_Phase], place: int, squares: float) -> bool:
@@ -196,32 +192,28 @@ class _Decaying:
         return ends and abs(self.lead - self.expected) < _LEAD * self.expected
 
 
-@dataclass(frozen=True)
-class CoupledSensor(StatementSlip):
+def coupled_sensor(evidence: SlipEvidence) -> tuple[Remark, ...]:
     """The centre decays to zero and the oscillation leads, with one time constant. Refused: it looks like a drift.
 
     The sensor is AC-coupled, with a high-pass filter before the logger. Its reading of a release is an oscillation
     with a phase lead of arctan(1/ωτ), about a centre that decays as exp(-t/τ) to zero. Creep of a spring also moves
     the centre, but without the lead; a drift does not end at zero.
     """
-
-    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
-        """Fit a decaying centre to every free decay of an angle; most runs that show one must agree."""
-        if evidence.campaign.sensor.derivative or not evidence.swings:
-            return ()
-        decaying = [one for swing in evidence.swings if (one := _decaying(swing)) is not None]
-        found = [one for one in decaying if one.coupled]
-        if 2 * len(found) <= len(decaying):  # one sensor reads all runs; with a drift some lead by chance
-            return ()
-        if len(found) == 1 < len(evidence.swings) and found[0].constant < _LASTING * found[0].period:
-            return ()
-        constant = float(np.median([one.constant for one in found]))
-        what = (
-            f"the centre of the motion decays to zero with a time constant of about {constant:.2g} s, and the "
-            "reading leads as by a high-pass filter of that constant: the sensor or the logger is AC-coupled"
-        )
-        remedy = "record with DC coupling, or leave the runs out"
-        return (Remark(Outcome.REFUSED, tuple(one.run for one in found), what, remedy),)
+    if evidence.campaign.sensor.derivative or not evidence.swings:
+        return ()
+    decaying = [one for swing in evidence.swings if (one := _decaying(swing)) is not None]
+    found = [one for one in decaying if one.coupled]
+    if 2 * len(found) <= len(decaying):  # one sensor reads all runs; with a drift some lead by chance
+        return ()
+    if len(found) == 1 < len(evidence.swings) and found[0].constant < _LASTING * found[0].period:
+        return ()
+    constant = float(np.median([one.constant for one in found]))
+    what = (
+        f"the centre of the motion decays to zero with a time constant of about {constant:.2g} s, and the "
+        "reading leads as by a high-pass filter of that constant: the sensor or the logger is AC-coupled"
+    )
+    remedy = "record with DC coupling, or leave the runs out"
+    return (Remark(Outcome.REFUSED, tuple(one.run for one in found), what, remedy),)
 
 
 def _decaying(swing: Swing) -> _Decaying | None:

@@ -12,7 +12,7 @@ from scipy.special import chdtri, stdtrit
 
 from identification import policy
 from identification.examination.self_excited import Swing
-from identification.examination.slips.base import SlipEvidence, StatementSlip
+from identification.examination.slips.base import SlipEvidence
 from identification.show.numbers import significant, with_std
 from identification.signal.noise import measured_noise
 from identification.status import Outcome, Remark
@@ -38,28 +38,24 @@ class OtherGain:
     std: float
 
 
-@dataclass(frozen=True)
-class OddGain(StatementSlip):
+def odd_gain(evidence: SlipEvidence) -> tuple[Remark, ...]:
     """Noise and swing of one run are the others' times one factor. Named: ωn and ζ do not change.
 
     In a linear decay another gain, such as another range of the amplifier, looks like another release. But it
     scales the noise of the sensor by the same factor as the swing, and another release does not.
     """
-
-    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
-        """Compare noise and swing of every run with the other runs."""
-        found = other_gain(evidence)
-        if found is None:
-            return ()
-        what = (
-            "its noise, and its swing over the stated release_angle, are both "
-            f"{with_std(found.ratio, found.std)} times those of the other runs: the sensor had another gain"
-        )
-        remedy = (
-            "check the range of its amplifier and repeat the run, or leave the run out with "
-            f"--leave-out {found.run.id}"
-        )
-        return (Remark(Outcome.NOTED, (found.run.id,), what, remedy),)
+    found = other_gain(evidence)
+    if found is None:
+        return ()
+    what = (
+        "its noise, and its swing over the stated release_angle, are both "
+        f"{with_std(found.ratio, found.std)} times those of the other runs: the sensor had another gain"
+    )
+    remedy = (
+        "check the range of its amplifier and repeat the run, or leave the run out with "
+        f"--leave-out {found.run.id}"
+    )
+    return (Remark(Outcome.NOTED, (found.run.id,), what, remedy),)
 
 
 def other_gain(evidence: SlipEvidence) -> OtherGain | None:
@@ -161,42 +157,34 @@ _SPREAD = 1.7  # maximum ratio of the other runs' noise: they have one sensor
 _SPREADS = 4.0  # logarithms of that ratio
 
 
-@dataclass(frozen=True)
-class OddNoise(StatementSlip):
+def odd_noise(evidence: SlipEvidence) -> tuple[Remark, ...]:
     """One run has far less or far more noise than all others, in some band of frequencies. Named.
 
     It has another range, sensor, cable or filter. A run with far less noise is refused: a filter smooths its
     start, which looks like other oscillations.
     """
-
-    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
-        """Compare the median power of all runs in octaves above the motion; a line of hum does not change it.
-
-        The wind may add noise: a run is compared only with others of similar wind. `OddGain` names a run with
-        another gain.
-        """
-        if len(evidence.swings) < _FEWEST_COMPARED or other_gain(evidence) is not None:
-            return ()
-        bands, power = _powers(evidence.swings)
-        if not bands.size:
-            return ()
-        logs = 0.5 * np.log(power)
-        pressure = np.array([(s.run.air_density or 0.0) * s.run.wind_speed**2 for s in evidence.swings])
-        for place, swing in enumerate(evidence.swings):
-            others, winds = np.delete(logs, place, axis=0), np.delete(pressure, place)
-            spread = np.ptp(others, axis=0)
-            if np.any(spread > np.log(_SPREAD)):
-                continue
-            ratio = logs[place] - others.mean(axis=0)
-            odd = np.abs(ratio) > np.maximum(np.log(policy.ODD_NOISE), _SPREADS * spread)
-            less, more = odd & (ratio < 0.0), odd & (ratio > 0.0)
-            if less.any() and np.any(winds <= pressure[place]):
-                return (_less(swing, float(bands[less][0]), float(ratio.min())),)
-            if more.any() and np.any(winds >= pressure[place]):
-                what = f"its noise is {np.exp(ratio.max()):.2g} times as large as that of every other run"
-                remedy = "check the sensor's range, its cable and the unit, or leave the run out"
-                return (Remark(Outcome.NOTED, (swing.run.id,), what, remedy),)
+    if len(evidence.swings) < _FEWEST_COMPARED or other_gain(evidence) is not None:
         return ()
+    bands, power = _powers(evidence.swings)
+    if not bands.size:
+        return ()
+    logs = 0.5 * np.log(power)
+    pressure = np.array([(s.run.air_density or 0.0) * s.run.wind_speed**2 for s in evidence.swings])
+    for place, swing in enumerate(evidence.swings):
+        others, winds = np.delete(logs, place, axis=0), np.delete(pressure, place)
+        spread = np.ptp(others, axis=0)
+        if np.any(spread > np.log(_SPREAD)):
+            continue
+        ratio = logs[place] - others.mean(axis=0)
+        odd = np.abs(ratio) > np.maximum(np.log(policy.ODD_NOISE), _SPREADS * spread)
+        less, more = odd & (ratio < 0.0), odd & (ratio > 0.0)
+        if less.any() and np.any(winds <= pressure[place]):
+            return (_less(swing, float(bands[less][0]), float(ratio.min())),)
+        if more.any() and np.any(winds >= pressure[place]):
+            what = f"its noise is {np.exp(ratio.max()):.2g} times as large as that of every other run"
+            remedy = "check the sensor's range, its cable and the unit, or leave the run out"
+            return (Remark(Outcome.NOTED, (swing.run.id,), what, remedy),)
+    return ()
 
 
 def _less(swing: Swing, first: float, ratio: float) -> Remark:
@@ -242,49 +230,43 @@ _FEWEST_SIDES = 3  # minimum number of runs: of two different zeros, either may 
 _NEAR = 0.25
 
 
-@dataclass(frozen=True)
-class MirroredRun(StatementSlip):
+def mirrored_run(evidence: SlipEvidence) -> tuple[Remark, ...]:
     """Some runs swing about the zero of the others with its sign inverted. Refused: it looks like an effect.
 
     A mirrored decay is also a decay. Only asymmetries reveal it: the sensor's zero, which changes its sign in a
     mirrored run, and the release angle, where it is stated.
     """
-
-    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
-        """Compare the zeros of all runs as stated and with some signs inverted."""
-        swings = evidence.swings
-        if len(swings) < _FEWEST_SIDES or evidence.stated.sensor.zero == "per_run":
-            return ()
-        zeros = np.array([swing.zero for swing in swings])
-        std = np.array([max(swing.zero_std, 1e-300) for swing in swings])
-        size = float(np.median(np.abs(zeros)))
-        # the runs that differ; if they are half of all, the runs that begin on the less usual side
-        minus = zeros < 0.0
-        odd = minus if 2 * minus.sum() < zeros.size else ~minus
-        if not odd.any() or odd.all():
-            return ()
-        upright = np.where(odd, -zeros, zeros)
-        freedom, allowed = zeros.size - 1, np.hypot(std, policy.ZERO_STEADINESS * size)
-        agree = _scatter(upright, allowed) <= float(chdtri(freedom, policy.MISFIT_RATE))
-        differ = _scatter(zeros, allowed) > float(chdtri(freedom, policy.REFUSAL_RATE))
-        if not (agree and differ) or float(np.ptp(np.abs(zeros))) > _NEAR * size:
-            return ()
-        halves = 2 * int(odd.sum()) == zeros.size
-        if _of_wind(swings, odd):
-            return ()
-        names = tuple(s.run.id for s, one in zip(swings, odd, strict=True) if one)
-        rest = tuple(s.run.id for s, one in zip(swings, odd, strict=True) if not one)
-        ids = names + rest if halves else names
-        who = "half of the runs (" + ", ".join(names) + ")" if halves else "the reading"
-        what = (
-            f"{who} {'swing' if halves else 'swings'} about {_signed(swings, odd)} {evidence.campaign.sensor.unit} "
-            f"and the others about {_signed(swings, ~odd)}: the sign of the sensor is inverted between them"
-        )
-        return (
-            Remark(
-                Outcome.REFUSED, ids, what, "invert the sign of these readings, or state zero = 'per_run'"
-            ),
-        )
+    swings = evidence.swings
+    if len(swings) < _FEWEST_SIDES or evidence.stated.sensor.zero == "per_run":
+        return ()
+    zeros = np.array([swing.zero for swing in swings])
+    std = np.array([max(swing.zero_std, 1e-300) for swing in swings])
+    size = float(np.median(np.abs(zeros)))
+    # the runs that differ; if they are half of all, the runs that begin on the less usual side
+    minus = zeros < 0.0
+    odd = minus if 2 * minus.sum() < zeros.size else ~minus
+    if not odd.any() or odd.all():
+        return ()
+    upright = np.where(odd, -zeros, zeros)
+    freedom, allowed = zeros.size - 1, np.hypot(std, policy.ZERO_STEADINESS * size)
+    agree = _scatter(upright, allowed) <= float(chdtri(freedom, policy.MISFIT_RATE))
+    differ = _scatter(zeros, allowed) > float(chdtri(freedom, policy.REFUSAL_RATE))
+    if not (agree and differ) or float(np.ptp(np.abs(zeros))) > _NEAR * size:
+        return ()
+    halves = 2 * int(odd.sum()) == zeros.size
+    if _of_wind(swings, odd):
+        return ()
+    names = tuple(s.run.id for s, one in zip(swings, odd, strict=True) if one)
+    rest = tuple(s.run.id for s, one in zip(swings, odd, strict=True) if not one)
+    ids = names + rest if halves else names
+    who = "half of the runs (" + ", ".join(names) + ")" if halves else "the reading"
+    what = (
+        f"{who} {'swing' if halves else 'swings'} about {_signed(swings, odd)} {evidence.campaign.sensor.unit} "
+        f"and the others about {_signed(swings, ~odd)}: the sign of the sensor is inverted between them"
+    )
+    return (
+        Remark(Outcome.REFUSED, ids, what, "invert the sign of these readings, or state zero = 'per_run'"),
+    )
 
 
 def _scatter(values: Array, std: Array) -> float:
@@ -308,72 +290,63 @@ def _of_wind(swings: tuple[Swing, ...], odd: NDArray[np.bool_]) -> bool:
     return len(conditions) == 1 and bool(np.all(odd == windy) or np.all(odd == ~windy))
 
 
-@dataclass(frozen=True)
-class ReleaseOnTheOtherSide(StatementSlip):
+def release_on_the_other_side(evidence: SlipEvidence) -> tuple[Remark, ...]:
     """A stated release angle of the opposite sign to the record. Asked about: no answer depends on it."""
-
-    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
-        """Compare sides where the record begins at its turning point, and the angle is stated."""
-        if evidence.campaign.sensor.derivative:
-            return ()
-        ids = []
-        for swing in evidence.swings:
-            stated, first = swing.run.release_angle or 0.0, float(swing.motion[0])
-            turning = abs(first) > policy.CLEAR_RELEASE * swing.amplitude
-            decays = swing.rate > policy.MISFIT_DEVIATIONS * swing.rate_std
-            low, high = policy.RELEASE_AS_STATED
-            if turning and decays and -high < first / (stated or np.inf) < -low:
-                ids.append(swing.run.id)
-        if not ids:
-            return ()
-        what = "the record begins on the other side than the stated release_angle"
-        remedy = "correct the sign of release_angle, or of the readings"
-        return (Remark(Outcome.NOTED, tuple(ids), what, remedy),)
+    if evidence.campaign.sensor.derivative:
+        return ()
+    ids = []
+    for swing in evidence.swings:
+        stated, first = swing.run.release_angle or 0.0, float(swing.motion[0])
+        turning = abs(first) > policy.CLEAR_RELEASE * swing.amplitude
+        decays = swing.rate > policy.MISFIT_DEVIATIONS * swing.rate_std
+        low, high = policy.RELEASE_AS_STATED
+        if turning and decays and -high < first / (stated or np.inf) < -low:
+            ids.append(swing.run.id)
+    if not ids:
+        return ()
+    what = "the record begins on the other side than the stated release_angle"
+    remedy = "correct the sign of release_angle, or of the readings"
+    return (Remark(Outcome.NOTED, tuple(ids), what, remedy),)
 
 
 _SUSPICIOUS = 10.0  # maximum ratio to the amplitudes of other runs; beyond it the noise is compared
 
 
-@dataclass(frozen=True)
-class AngleInDegrees(StatementSlip):
+def angle_in_degrees(evidence: SlipEvidence) -> tuple[Remark, ...]:
     """Amplitude and noise of some runs are 57.3 times the others', or 1/57.3 of them. Refused.
 
     For displacements in millimetres the factor is 1000.
 
     The smaller group of runs is wrong; of two equal groups either may be wrong.
     """
-
-    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
-        """Compare amplitudes and, where they differ much, the noise."""
-        if len(evidence.swings) < 2 or evidence.campaign.sensor.plausible is False:
-            return ()
-        amplitudes = np.array([swing.amplitude for swing in evidence.swings])
-        large = amplitudes > _SUSPICIOUS * float(amplitudes.min())
-        if not large.any():
-            return ()
-        noise = np.array([measured_noise(swing.run.record)[0] for swing in evidence.swings])
-        ratio = float(np.median(noise[large]) / np.median(noise[~large]))
-        alike = [
-            np.abs(noise[some] / np.median(noise[some]) - 1.0) < policy.NOISE_RATIO
-            for some in (large, ~large)
-        ]
-        if abs(ratio / evidence.campaign.sensor.freedom.slip - 1.0) > policy.NOISE_RATIO or not all(
-            np.all(one) for one in alike
-        ):
-            return ()
-        ids = [
-            tuple(s.run.id for s, one in zip(evidence.swings, some, strict=True) if one)
-            for some in (large, ~large)
-        ]
-        exceed = f"amplitude and noise exceed those of the other runs, by {ratio:.3g} times: degrees"
-        below = f"amplitude and noise are 1/{ratio:.3g} of those of the other runs: radians in a column of degrees"
-        if len(ids[0]) < len(ids[1]):
-            remedy = "name the column yaw_deg, or convert it to radians"
-            return (Remark(Outcome.REFUSED, ids[0], exceed, remedy),)
-        if len(ids[0]) > len(ids[1]):
-            return (
-                Remark(Outcome.REFUSED, ids[1], below, "name the column yaw_rad, or convert it to degrees"),
-            )
-        what = f"{exceed}; or, of runs {', '.join(ids[1])}, {below}"
-        remedy = "name the columns yaw_deg or yaw_rad by their units"
-        return (Remark(Outcome.REFUSED, ids[0] + ids[1], what, remedy),)
+    if len(evidence.swings) < 2 or evidence.campaign.sensor.plausible is False:
+        return ()
+    amplitudes = np.array([swing.amplitude for swing in evidence.swings])
+    large = amplitudes > _SUSPICIOUS * float(amplitudes.min())
+    if not large.any():
+        return ()
+    noise = np.array([measured_noise(swing.run.record)[0] for swing in evidence.swings])
+    ratio = float(np.median(noise[large]) / np.median(noise[~large]))
+    alike = [
+        np.abs(noise[some] / np.median(noise[some]) - 1.0) < policy.NOISE_RATIO for some in (large, ~large)
+    ]
+    if abs(ratio / evidence.campaign.sensor.freedom.slip - 1.0) > policy.NOISE_RATIO or not all(
+        np.all(one) for one in alike
+    ):
+        return ()
+    ids = [
+        tuple(s.run.id for s, one in zip(evidence.swings, some, strict=True) if one)
+        for some in (large, ~large)
+    ]
+    exceed = f"amplitude and noise exceed those of the other runs, by {ratio:.3g} times: degrees"
+    below = (
+        f"amplitude and noise are 1/{ratio:.3g} of those of the other runs: radians in a column of degrees"
+    )
+    if len(ids[0]) < len(ids[1]):
+        remedy = "name the column yaw_deg, or convert it to radians"
+        return (Remark(Outcome.REFUSED, ids[0], exceed, remedy),)
+    if len(ids[0]) > len(ids[1]):
+        return (Remark(Outcome.REFUSED, ids[1], below, "name the column yaw_rad, or convert it to degrees"),)
+    what = f"{exceed}; or, of runs {', '.join(ids[1])}, {below}"
+    remedy = "name the columns yaw_deg or yaw_rad by their units"
+    return (Remark(Outcome.REFUSED, ids[0] + ids[1], what, remedy),)

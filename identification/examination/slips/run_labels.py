@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from identification import policy
-from identification.examination.slips.base import SlipEvidence, StatementSlip
+from identification.examination.slips.base import SlipEvidence
 from identification.examination.slips.fits import Statements, agreement
 from identification.status import Outcome, Remark
 
@@ -139,55 +139,42 @@ class _Trial:
 Trials = Callable[[Statements, Sequence[int]], Iterator[_Trial]]
 
 
-@dataclass(frozen=True)
-class WrongLabel(StatementSlip):
+def wrong_label(evidence: SlipEvidence) -> tuple[Remark, ...]:
     """One run's label contradicts the others grossly, and agrees if a common slip is undone. Refused."""
-
-    labels: tuple[Label, ...] = LABELS
-
-    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
-        """Try every label of every run."""
-        return _found(evidence, self.trials)
-
-    def trials(self, statements: Statements, suspects: Sequence[int]) -> Iterator[_Trial]:
-        """Every label of every suspect."""
-        for label in self.labels:
-            for place in suspects:
-                yield from _relabelled(statements, label, (place,))
+    return _found(evidence, _of_one_run)
 
 
-@dataclass(frozen=True)
-class WrongLabels(StatementSlip):
+def _of_one_run(statements: Statements, suspects: Sequence[int]) -> Iterator[_Trial]:
+    """Every label of every suspect."""
+    for label in LABELS:
+        for place in suspects:
+            yield from _relabelled(statements, label, (place,))
+
+
+def wrong_labels(evidence: SlipEvidence) -> tuple[Remark, ...]:
     """Labels of two runs or settings are exchanged, or one slip is in two runs or a whole setting. Refused."""
+    return _found(evidence, _of_several_runs)
 
-    labels: tuple[Label, ...] = LABELS
 
-    def find(self, evidence: SlipEvidence) -> tuple[Remark, ...]:
-        """Try all exchanges, and every label of every setting and of every pair."""
-        return _found(evidence, self.trials)
-
-    def trials(self, statements: Statements, suspects: Sequence[int]) -> Iterator[_Trial]:
-        """All exchanges, and every label of every setting and of every pair of suspects."""
-        count = len(statements.runs)
-        for keys in (("spring",), ("speed",), ("spring", "speed")):
-            for i, j in itertools.combinations(range(count) if count <= _MOST_PAIRED else suspects, 2):
-                if i in suspects or j in suspects:
-                    yield from _exchanged(statements, keys, (i,), (j,))
-        for label in self.labels:
-            settings = _settings(statements, label.key)
-            yield from (
-                trial
-                for at in settings
-                if 1 < len(at) < count
-                for trial in _relabelled(statements, label, at)
-            )
-            for at in itertools.combinations(suspects, 2) if label.repeats else ():
-                if at not in settings:
-                    yield from _relabelled(statements, label, at)
-        for key in ("spring", "speed"):
-            for one, two in itertools.combinations(_settings(statements, key), 2):
-                if len(one) + len(two) > 2:
-                    yield from _exchanged(statements, (key,), one, two)
+def _of_several_runs(statements: Statements, suspects: Sequence[int]) -> Iterator[_Trial]:
+    """All exchanges, and every label of every setting and of every pair of suspects."""
+    count = len(statements.runs)
+    for keys in (("spring",), ("speed",), ("spring", "speed")):
+        for i, j in itertools.combinations(range(count) if count <= _MOST_PAIRED else suspects, 2):
+            if i in suspects or j in suspects:
+                yield from _exchanged(statements, keys, (i,), (j,))
+    for label in LABELS:
+        settings = _settings(statements, label.key)
+        yield from (
+            trial for at in settings if 1 < len(at) < count for trial in _relabelled(statements, label, at)
+        )
+        for at in itertools.combinations(suspects, 2) if label.repeats else ():
+            if at not in settings:
+                yield from _relabelled(statements, label, at)
+    for key in ("spring", "speed"):
+        for one, two in itertools.combinations(_settings(statements, key), 2):
+            if len(one) + len(two) > 2:
+                yield from _exchanged(statements, (key,), one, two)
 
 
 def _settings(statements: Statements, key: str) -> list[tuple[int, ...]]:
@@ -198,8 +185,8 @@ def _settings(statements: Statements, key: str) -> list[tuple[int, ...]]:
 
 def mending_statements(evidence: SlipEvidence) -> list[Statements]:
     """Statements with other labels that agree with the frequencies, of the runs that state a spring."""
-    slips = (WrongLabel(), WrongLabels())
-    return [trial.labels for slip in slips for trial, _ in _mended(evidence, slip.trials)[1]]
+    kinds = (_of_one_run, _of_several_runs)
+    return [trial.labels for trials in kinds for trial, _ in _mended(evidence, trials)[1]]
 
 
 def _mended(evidence: SlipEvidence, trials: Trials) -> tuple[Statements | None, list[tuple[_Trial, float]]]:

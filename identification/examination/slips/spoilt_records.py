@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
 from identification import policy
-from identification.examination.slips.base import RecordSlip
 from identification.policy import LEAST_SAMPLES
 from identification.signal.decay_fit import Reading, fit_run, projected_cost
 from identification.signal.frequency import starting_decay, starting_frequency
@@ -25,19 +24,15 @@ from tunnel_sim.vocabulary.record import Array, Record
 _WORSE = 4.0  # minimum factor by which the jump increases the sum of squares
 
 
-@dataclass(frozen=True)
-class ClockJumps(RecordSlip):
+def clock_jumps(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
     """The times jump once while the reading continues. Refused: the frequency would be wrong."""
-
-    def mend(self, campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
-        """Seek a jump in every free decay."""
-        remedy = "correct the clock of the samples after it, or make two runs of the file"
-        remarks = [
-            Remark(Outcome.REFUSED, (run.id,), jump_words(run.record, at), remedy)
-            for run in campaign.runs
-            if run.drive is None and (at := clock_jump(run.record)) is not None and _jumps(run.record, at)
-        ]
-        return campaign, tuple(remarks)
+    remedy = "correct the clock of the samples after it, or make two runs of the file"
+    remarks = [
+        Remark(Outcome.REFUSED, (run.id,), jump_words(run.record, at), remedy)
+        for run in campaign.runs
+        if run.drive is None and (at := clock_jump(run.record)) is not None and _jumps(run.record, at)
+    ]
+    return campaign, tuple(remarks)
 
 
 def _jumps(record: Record, at: int) -> bool:
@@ -55,28 +50,22 @@ def _jumps(record: Record, at: int) -> bool:
     return stated > max(policy.GROSS_MISFIT * power, _WORSE * mended)
 
 
-@dataclass(frozen=True)
-class StandingForMissing(RecordSlip):
+def code_for_missing(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
     """A value far from all others, such as -9.99, stands for missing readings. These samples are left out."""
-
-    def mend(self, campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
-        """Leave out these samples of the free decays."""
-        runs, remarks = [], []
-        for run in campaign.runs:
-            record = run.record
-            standing = None if run.drive is not None else standing_for_missing(record.yaw_rad)
-            if standing is not None:
-                value, count = float(record.yaw_rad[standing][0]), int(standing.sum())
-                what = (
-                    f"{counted(count, 'reading')} of {value:.6g} {campaign.sensor.unit}, far from all others, as a "
-                    "value that stands for a missing one; left out"
-                )
-                remarks.append(
-                    Remark(Outcome.CUT, (run.id,), what, "check the logger and the sensor's cable")
-                )
-                run = replace(run, record=Record(record.time_s[~standing], record.yaw_rad[~standing]))
-            runs.append(run)
-        return (replace(campaign, runs=tuple(runs)) if remarks else campaign), tuple(remarks)
+    runs, remarks = [], []
+    for run in campaign.runs:
+        record = run.record
+        standing = None if run.drive is not None else standing_for_missing(record.yaw_rad)
+        if standing is not None:
+            value, count = float(record.yaw_rad[standing][0]), int(standing.sum())
+            what = (
+                f"{counted(count, 'reading')} of {value:.6g} {campaign.sensor.unit}, far from all others, as a "
+                "value that stands for a missing one; left out"
+            )
+            remarks.append(Remark(Outcome.CUT, (run.id,), what, "check the logger and the sensor's cable"))
+            run = replace(run, record=Record(record.time_s[~standing], record.yaw_rad[~standing]))
+        runs.append(run)
+    return (replace(campaign, runs=tuple(runs)) if remarks else campaign), tuple(remarks)
 
 
 _TURN = 2.0 * np.pi
@@ -85,35 +74,31 @@ _TURN = 2.0 * np.pi
 _SMOOTH = 0.1
 
 
-@dataclass(frozen=True)
-class WrappedAngle(RecordSlip):
-    """The reading jumps by whole turns, like a restarted encoder's; unwrapped it is smooth. It is unwrapped."""
+def wrapped_angle(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
+    """The reading jumps by whole turns, like a restarted encoder's; unwrapped it is smooth. It is unwrapped.
 
-    def mend(self, campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
-        """Unwrap records in which all large steps are whole turns, and shift them to the turn of the other runs.
-
-        Rates, accelerations and displacements do not wrap.
-        """
-        if campaign.sensor.derivative or not campaign.sensor.freedom.turns:
-            return campaign, ()
-        turns = {run.id: found for run in campaign.runs if (found := _turns(run.record)) is not None}
-        if not turns:
-            return campaign, ()
-        whole = {
-            run.id: run.record.yaw_rad - _TURN * turns[run.id] if run.id in turns else run.record.yaw_rad
-            for run in campaign.runs
-        }
-        rest = [float(np.median(whole[run.id])) for run in campaign.runs if run.id not in turns]
-        place = float(np.median(rest)) if rest else float(np.median(whole[next(iter(turns))]))
-        runs = []
-        for run in campaign.runs:
-            yaw = whole[run.id]
-            off = _TURN * round((float(np.median(yaw)) - place) / _TURN) if run.id in turns else 0.0
-            runs.append(replace(run, record=Record(run.record.time_s, yaw - off)) if run.id in turns else run)
-        jumps = sum(int(np.count_nonzero(np.diff(found))) for found in turns.values())
-        what = f"the angle jumps by whole turns, {jumps} times, as an encoder's that wraps; it is unwrapped"
-        remedy = "write the angle without wraps, or shift its zero"
-        return replace(campaign, runs=tuple(runs)), (Remark(Outcome.NOTED, tuple(turns), what, remedy),)
+    A record is shifted to the turn of the other runs. Rates, accelerations and displacements do not wrap.
+    """
+    if campaign.sensor.derivative or not campaign.sensor.freedom.turns:
+        return campaign, ()
+    turns = {run.id: found for run in campaign.runs if (found := _turns(run.record)) is not None}
+    if not turns:
+        return campaign, ()
+    whole = {
+        run.id: run.record.yaw_rad - _TURN * turns[run.id] if run.id in turns else run.record.yaw_rad
+        for run in campaign.runs
+    }
+    rest = [float(np.median(whole[run.id])) for run in campaign.runs if run.id not in turns]
+    place = float(np.median(rest)) if rest else float(np.median(whole[next(iter(turns))]))
+    runs = []
+    for run in campaign.runs:
+        yaw = whole[run.id]
+        off = _TURN * round((float(np.median(yaw)) - place) / _TURN) if run.id in turns else 0.0
+        runs.append(replace(run, record=Record(run.record.time_s, yaw - off)) if run.id in turns else run)
+    jumps = sum(int(np.count_nonzero(np.diff(found))) for found in turns.values())
+    what = f"the angle jumps by whole turns, {jumps} times, as an encoder's that wraps; it is unwrapped"
+    remedy = "write the angle without wraps, or shift its zero"
+    return replace(campaign, runs=tuple(runs)), (Remark(Outcome.NOTED, tuple(turns), what, remedy),)
 
 
 def _turns(record: Record) -> Array | None:
@@ -132,30 +117,26 @@ _UNCHANGED = 1e-4  # share of a step: no change
 _MOST = 0.2  # share of the changes off the lattice: a filter or a few outliers may move some
 
 
-@dataclass(frozen=True)
-class ResolutionTooCoarse(RecordSlip):
+def resolution_too_coarse(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
     """The readings are far finer than their stated resolution. It is not used: as noise it would hide gaps."""
-
-    def mend(self, campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
-        """Drop the resolution if the first records are off its lattice, and smooth or small compared with it."""
-        step = campaign.sensor.resolution
-        if not step:
-            return campaign, ()
-        records = [run.record for run in campaign.runs[:_LOOKED_AT]]
-        if not all(_off_lattice(record.yaw_rad, step) for record in records):
-            return campaign, ()
-        swing = float(np.median([0.5 * np.ptp(record.yaw_rad) for record in records]))
-        noise = float(np.median([measured_noise(record)[0] for record in records]))
-        if swing > policy.LEAST_STEPS * step and noise > policy.FINER_THAN_STATED * step:
-            return campaign, ()
-        what = (
-            f"resolution = {step:.3g} {campaign.sensor.unit} contradicts the readings, which swing by ±{swing:.3g} "
-            f"{campaign.sensor.unit} in far finer steps; it is not used"
-        )
-        remark = Remark(
-            Outcome.NOTED, tuple(run.id for run in campaign.runs), what, "correct resolution, or leave it out"
-        )
-        return replace(campaign, sensor=replace(campaign.sensor, resolution=None)), (remark,)
+    step = campaign.sensor.resolution
+    if not step:
+        return campaign, ()
+    records = [run.record for run in campaign.runs[:_LOOKED_AT]]
+    if not all(_off_lattice(record.yaw_rad, step) for record in records):
+        return campaign, ()
+    swing = float(np.median([0.5 * np.ptp(record.yaw_rad) for record in records]))
+    noise = float(np.median([measured_noise(record)[0] for record in records]))
+    if swing > policy.LEAST_STEPS * step and noise > policy.FINER_THAN_STATED * step:
+        return campaign, ()
+    what = (
+        f"resolution = {step:.3g} {campaign.sensor.unit} contradicts the readings, which swing by ±{swing:.3g} "
+        f"{campaign.sensor.unit} in far finer steps; it is not used"
+    )
+    remark = Remark(
+        Outcome.NOTED, tuple(run.id for run in campaign.runs), what, "correct resolution, or leave it out"
+    )
+    return replace(campaign, sensor=replace(campaign.sensor, resolution=None)), (remark,)
 
 
 def _off_lattice(yaw: Array, step: float) -> bool:
@@ -184,31 +165,25 @@ _STEPS = 3.0
 _CLEAR = 5.0  # multiple of the band of the constant reading that the last swing must exceed
 
 
-@dataclass(frozen=True)
-class StuckReading(RecordSlip):
+def stuck_reading(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
     """The reading keeps one value to the last bit for most of a cycle, between swings. These samples are left out.
 
     A clipped or coarse reading keeps a value for less than half a cycle, at its turning points.
     """
-
-    def mend(self, campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
-        """Leave out the stretches in which the reading of a free decay is stuck."""
-        runs, remarks = [], []
-        for run in campaign.runs:
-            stuck = None if run.drive is not None else stuck_samples(run.record)
-            if stuck is not None:
-                time, yaw = run.record.time_s, run.record.yaw_rad
-                where = np.flatnonzero(stuck)
-                what = (
-                    f"between {time[where[0]]:.3f} and {time[where[-1]]:.3f} s the reading is constant while the "
-                    f"body moves; {counted(where.size, 'sample')} left out"
-                )
-                remarks.append(
-                    Remark(Outcome.CUT, (run.id,), what, "check the logger and the sensor's cable")
-                )
-                run = replace(run, record=Record(time[~stuck], yaw[~stuck]))
-            runs.append(run)
-        return (replace(campaign, runs=tuple(runs)) if remarks else campaign), tuple(remarks)
+    runs, remarks = [], []
+    for run in campaign.runs:
+        stuck = None if run.drive is not None else stuck_samples(run.record)
+        if stuck is not None:
+            time, yaw = run.record.time_s, run.record.yaw_rad
+            where = np.flatnonzero(stuck)
+            what = (
+                f"between {time[where[0]]:.3f} and {time[where[-1]]:.3f} s the reading is constant while the "
+                f"body moves; {counted(where.size, 'sample')} left out"
+            )
+            remarks.append(Remark(Outcome.CUT, (run.id,), what, "check the logger and the sensor's cable"))
+            run = replace(run, record=Record(time[~stuck], yaw[~stuck]))
+        runs.append(run)
+    return (replace(campaign, runs=tuple(runs)) if remarks else campaign), tuple(remarks)
 
 
 def stuck_samples(record: Record) -> NDArray[np.bool_] | None:
@@ -234,29 +209,25 @@ def stuck_samples(record: Record) -> NDArray[np.bool_] | None:
     return stuck if stuck.any() and kept * frequency > _LEAST_KEPT else None
 
 
-@dataclass(frozen=True)
-class ConstantTail(RecordSlip):
+def constant_tail(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
     """The reading is constant from one moment on, after swings that cannot have ended so soon. The tail is cut.
 
     The file is padded, the logger stopped, or a hand holds the body.
     """
-
-    def mend(self, campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
-        """Cut every free decay to the part before its tail."""
-        runs, remarks = [], []
-        for run in campaign.runs:
-            at = None if run.drive is not None else standing_from(run.record)
-            if at is not None:
-                time, yaw = run.record.time_s, run.record.yaw_rad
-                what = (
-                    f"from {time[at]:.3f} s the reading is constant at {float(np.median(yaw[at:])):.4g} "
-                    f"{campaign.sensor.unit}, too soon for the motion to have decayed; this part is left out"
-                )
-                remedy = "check for a padded file, a stopped logger or a body held by hand"
-                remarks.append(Remark(Outcome.CUT, (run.id,), what, remedy))
-                run = replace(run, record=Record(time[:at], yaw[:at]))
-            runs.append(run)
-        return (replace(campaign, runs=tuple(runs)) if remarks else campaign), tuple(remarks)
+    runs, remarks = [], []
+    for run in campaign.runs:
+        at = None if run.drive is not None else standing_from(run.record)
+        if at is not None:
+            time, yaw = run.record.time_s, run.record.yaw_rad
+            what = (
+                f"from {time[at]:.3f} s the reading is constant at {float(np.median(yaw[at:])):.4g} "
+                f"{campaign.sensor.unit}, too soon for the motion to have decayed; this part is left out"
+            )
+            remedy = "check for a padded file, a stopped logger or a body held by hand"
+            remarks.append(Remark(Outcome.CUT, (run.id,), what, remedy))
+            run = replace(run, record=Record(time[:at], yaw[:at]))
+        runs.append(run)
+    return (replace(campaign, runs=tuple(runs)) if remarks else campaign), tuple(remarks)
 
 
 def standing_from(record: Record) -> int | None:
@@ -300,32 +271,28 @@ _MOST_PAIRS = 1500  # maximum number of comparisons, half a second
 _ROUNDING = 1e-9  # share of the largest reading: smaller differences are rounding errors
 
 
-@dataclass(frozen=True)
-class RepeatedRecord(RecordSlip):
+def repeated_record(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
     """Two runs are one measurement: under equal conditions it is counted once, under others refused.
 
     Two honest runs have nearly the same motion but never the same noise. The sixth difference of a record contains
     only its noise. Two records of one measurement share it, even after rounding, cutting or scaling, or with less
     noise added.
     """
-
-    def mend(self, campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
-        """Leave out runs that repeat an earlier one."""
-        left, remarks = dict[str, Remark](), dict[tuple[str, str], Remark]()
-        for earlier, run, said in [*_equal(campaign), *_alike(campaign)]:
-            pair = earlier.id, run.id
-            if earlier.id in left or run.id in left or pair in remarks:
-                continue
-            if _conditions(earlier) == _conditions(run):
-                remedy = "remove the run, or correct its file name"
-                what = f"{said} run {earlier.id}, so counted once"
-                left[run.id] = Remark(Outcome.LEFT_OUT, (run.id,), what, remedy)
-            else:
-                what = f"{said.removesuffix(' as')} with different springs or wind speeds"
-                remedy = "correct the file names, or remove one of the runs"
-                remarks[pair] = Remark(Outcome.REFUSED, pair, what, remedy)
-        runs = tuple(run for run in campaign.runs if run.id not in left)
-        return (replace(campaign, runs=runs) if left else campaign), (*left.values(), *remarks.values())
+    left, remarks = dict[str, Remark](), dict[tuple[str, str], Remark]()
+    for earlier, run, said in [*_equal(campaign), *_alike(campaign)]:
+        pair = earlier.id, run.id
+        if earlier.id in left or run.id in left or pair in remarks:
+            continue
+        if _conditions(earlier) == _conditions(run):
+            remedy = "remove the run, or correct its file name"
+            what = f"{said} run {earlier.id}, so counted once"
+            left[run.id] = Remark(Outcome.LEFT_OUT, (run.id,), what, remedy)
+        else:
+            what = f"{said.removesuffix(' as')} with different springs or wind speeds"
+            remedy = "correct the file names, or remove one of the runs"
+            remarks[pair] = Remark(Outcome.REFUSED, pair, what, remedy)
+    runs = tuple(run for run in campaign.runs if run.id not in left)
+    return (replace(campaign, runs=runs) if left else campaign), (*left.values(), *remarks.values())
 
 
 def _conditions(run: Run) -> tuple[float | None, ...]:

@@ -12,7 +12,7 @@ from diagnosis import diagnose
 from identification import identify
 from identification.estimate import PARAMETERS
 from identification.examination.examine import examine
-from identification.examination.slips.spoilt_records import ClockJumps
+from identification.examination.slips.spoilt_records import clock_jumps
 from identification.status import Outcome, Status
 from tests.marks import slow
 from tests.support.slip_cases import FURTHER, PLAIN, SIX, TABLE, Case
@@ -227,7 +227,7 @@ def test_samples_that_are_missing_are_no_jump_of_the_clock():
         for begin in rng.integers(200, 3000, 6).tolist():
             kept = np.r_[0:begin, begin + int(rng.integers(60, 1500)) : time.size]
             data = replace(PLAIN, runs=(replace(run, record=Record(time[kept], yaw[kept])),))
-            assert ClockJumps().mend(data)[1] == ()
+            assert clock_jumps(data)[1] == ()
 
 
 def test_noise_that_grows_with_the_wind_is_not_odd():
