@@ -168,12 +168,12 @@ def _read_mat(content: bytes, where: str) -> list[Table]:
     arrays: dict[str, NDArray[np.generic]] = {}
     runs, texts = {}, {}
     for path, value in _leaves({name: one for name, one in held.items() if not name.startswith("__")}):
-        group, below, name = path.rpartition("/")
+        group, _, name = path.rpartition("/")
         if not isinstance(value, str):
             arrays[path] = value
         elif name in RUN_IDS:
             runs[group] = value
-        elif below and name == "drive_hold":
+        elif name == "drive_hold":
             arrays[path] = np.array(hold_order(value))
         elif found := _number_in(group, name, value):
             arrays |= found

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 from scipy.signal import lfilter
 
 from tests.support.import_files import decay, written
@@ -137,3 +138,14 @@ def test_the_name_that_a_command_belongs_to() -> None:
         "theta",
         "position",
     ]
+
+
+def test_a_hold_beside_the_arrays_of_a_mat_file_is_that_of_the_input(tmp_path: Path) -> None:
+    path = tmp_path / "log.mat"
+    columns = {"time_s": TIME, "yaw_rad": ANGLE, "command_rad": COMMAND}
+    savemat(path, columns | {"drive_hold": "zero"})
+    imported = read_records([path])
+    (run,) = imported.campaign.runs
+    assert run.drive is not None
+    assert run.drive.hold == "zero"
+    assert any("drive_hold = zero from the file" in line for line in imported.remarks())
