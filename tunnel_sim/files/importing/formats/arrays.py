@@ -3,42 +3,63 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from types import MappingProxyType
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tunnel_sim.files.importing.condition_names import condition_of, resembles
-from tunnel_sim.files.importing.tables import LEAST_ROWS, Channel, Table
+from tunnel_sim.files.importing.formats.layout import facts_in
+from tunnel_sim.files.importing.tables import LEAST_ROWS, Channel, Table, hold_order
 from tunnel_sim.files.importing.units import split_unit
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import counted
 
-RUN_IDS = ("id", "run", "run_id")
+_RUN_IDS = ("id", "run", "run_id")
 """Members and attributes with a text that names the run in a group."""
 _MOST_CHANNELS = 256  # maximum number of rows of a matrix: it is transposed if it has more rows than columns
 
 
-def tables_of_arrays(
-    arrays: Mapping[str, NDArray[np.generic]],
-    kind: str,
-    units: Mapping[str, str] = MappingProxyType({}),
-    runs: Mapping[str, str] = MappingProxyType({}),
-    texts: Mapping[str, str] = MappingProxyType({}),
-) -> list[Table]:
+@dataclass(frozen=True)
+class NamedArrays:
+    """The content of a file so far, by path with ``/`` between groups.
+
+    Args:
+        arrays: matrices hold one channel in each row or column; single numbers are statements.
+        runs: name of the run in a group.
+        texts: other texts; the texts of every group belong to all tables.
+    """
+
+    arrays: dict[str, NDArray[np.generic]] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
+    runs: dict[str, str] = field(default_factory=dict)
+    texts: dict[str, str] = field(default_factory=dict)
+
+    def add_text(self, path: str, text: str) -> None:
+        """Add a text: the name of a run, the hold of an input, a number such as ``12 m/s``, or any other text."""
+        group, _, name = path.rpartition("/")
+        if name in _RUN_IDS:
+            self.runs[group] = text
+        elif name == "drive_hold":
+            self.arrays[path] = np.array(hold_order(text))
+        elif numbers := facts_in([f"{name}: {text}"]):
+            # A unit may contain the character that separates the parts of a path.
+            own = {heading.replace("/", "∕"): np.array(number) for heading, number in numbers.items()}
+            self.arrays.update({"/".join(filter(None, (group, one))): number for one, number in own.items()})
+        elif text.strip() and name:
+            self.texts[path] = text
+
+
+def tables_of_arrays(content: NamedArrays, kind: str) -> list[Table]:
     """Tables of arrays: arrays of the same group and length belong together.
 
     Single numbers are facts of the tables of their group and of the groups below. In a group without records
     they describe the other groups at its level.
-
-    Args:
-        arrays: by path, with ``/`` between groups; matrices hold one channel in each row or column.
-        texts: texts by path; the texts of every group belong to all tables.
     """
     facts: dict[str, dict[str, float]] = {}
     groups: dict[tuple[str, int], list[Channel]] = {}
-    for path, array in arrays.items():
+    for path, array in content.arrays.items():
         if array.dtype.kind not in "iufb":
             continue
         group, _, name = path.rpartition("/")
@@ -51,7 +72,7 @@ def tables_of_arrays(
         if matrix.shape[0] > matrix.shape[1]:
             matrix = matrix.T
         stem, unit = split_unit(name)
-        unit = units.get(path, unit)
+        unit = content.units.get(path, unit)
         # A short array is not a record; it may state a condition of each run.
         like = condition_of(stem, unit) or resembles(stem, unit)
         if matrix.shape[0] > _MOST_CHANNELS or (matrix.shape[1] < LEAST_ROWS and like is None):
@@ -65,13 +86,14 @@ def tables_of_arrays(
     facts = _of_described(facts, records)
     tables = []
     for (group, length), channels in groups.items():
-        part = runs.get(group) or (group.replace("/", "-") if several else "")
+        run = content.runs.get(group)
+        part = run or (group.replace("/", "-") if several else "")
         stated: dict[str, float] = {}
         for above in sorted(facts, key=len):  # the nearest group counts
             if above == "" or group == above or group.startswith(above + "/"):
                 stated |= facts[above]
         said = f"{kind}: {counted(len(channels), 'channel')} of {counted(length, 'sample')}"
-        tables.append(Table(tuple(channels), part, stated, (said,), named=bool(runs.get(group)), texts=texts))
+        tables.append(Table(tuple(channels), part, stated, (said,), named=bool(run), texts=content.texts))
     return tables
 
 

@@ -12,10 +12,10 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from tunnel_sim.files.importing.formats.arrays import RUN_IDS, check_size, tables_of_arrays
+from tunnel_sim.files.importing.formats.arrays import NamedArrays, check_size, tables_of_arrays
 from tunnel_sim.files.importing.formats.layout import facts_in
 from tunnel_sim.files.importing.formats.waveforms import Waveform, aligned_tables
-from tunnel_sim.files.importing.tables import Channel, Table, by_texts, hold_order, names_runs
+from tunnel_sim.files.importing.tables import Channel, Table, by_texts, names_runs
 from tunnel_sim.files.importing.units import known_unit, split_unit
 from tunnel_sim.files.readers import FileTable, Reader, faults
 from tunnel_sim.files.reading import check_count, frame_schema, read_frame
@@ -78,9 +78,7 @@ def _read_hdf5(content: bytes, where: str) -> list[Table]:
     h5py = library("h5py", "HDF5 (also MAT 7.3)", "import", where)
     with faults("an HDF5 file", where), h5py.File(io.BytesIO(content), "r") as file:
         datasets: dict[str, Any] = {}
-        attributes: dict[str, NDArray[np.generic]] = {}
-        runs: dict[str, str] = {}
-        texts: dict[str, str] = {}
+        found = NamedArrays()
 
         def visit(path: str, item: Any) -> None:
             remedy = "leave out datasets that are not needed"
@@ -96,31 +94,23 @@ def _read_hdf5(content: bytes, where: str) -> list[Table]:
                 held = item.attrs.get_id(name)  # other texts are not read: a text may be in a damaged heap
                 if held.dtype.kind in "iuf" and held.get_space().get_simple_extent_npoints() == 1:
                     folder = path if group else path.rpartition("/")[0]
-                    attributes[f"{folder}/{name}".lstrip("/")] = np.asarray(item.attrs[name])
-                elif group and name in RUN_IDS and isinstance(stated := item.attrs[name], str):
-                    runs[path] = stated
-                elif group and name == "drive_hold" and isinstance(stated := item.attrs[name], str):
-                    attributes[f"{path}/{name}"] = np.array(hold_order(stated))
-                elif group and isinstance(stated := item.attrs[name], str):
-                    if found := _number_in(path, name, stated):
-                        attributes.update(found)
-                    elif stated.strip():
-                        texts[f"{path}/{name}".lstrip("/")] = stated
+                    found.arrays[f"{folder}/{name}".lstrip("/")] = np.asarray(item.attrs[name])
+                elif group and isinstance(text := item.attrs[name], str):
+                    found.add_text(f"{path}/{name}".lstrip("/"), text)
 
         visit("", file)
         file.visititems(visit)  # links are not followed, so nothing outside the file is opened
         check_size(sum(int(np.prod(item.shape, dtype=float)) for item in datasets.values()), where)
-        arrays = attributes
         for path, item in datasets.items():
             if item.external or item.is_virtual or item.shape is None:
                 continue
             if item.dtype.names:  # one array for each field
                 table = item[()]
-                arrays |= {f"{path}/{name}": table[name] for name in item.dtype.names}
+                found.arrays.update({f"{path}/{name}": table[name] for name in item.dtype.names})
             elif item.dtype.kind in "iufb":
-                arrays[path] = _unpacked(item)
-        units = {path: _hdf5_unit(item) for path, item in datasets.items() if _hdf5_unit(item)}
-    return tables_of_arrays(arrays, "HDF5 file", units, runs, texts)
+                found.arrays[path] = _unpacked(item)
+        found.units.update({path: unit for path, item in datasets.items() if (unit := _hdf5_unit(item))})
+    return tables_of_arrays(found, "HDF5 file")
 
 
 def _unpacked(item: Any) -> NDArray[np.generic]:
@@ -165,31 +155,13 @@ def _read_mat(content: bytes, where: str) -> list[Table]:
             at += 8 + size
         check_size(total // 8, where)
         held = loadmat(cast(Any, io.BytesIO(content)), simplify_cells=True)  # the stubs know only paths
-    arrays: dict[str, NDArray[np.generic]] = {}
-    runs, texts = {}, {}
+    found = NamedArrays()
     for path, value in _leaves({name: one for name, one in held.items() if not name.startswith("__")}):
-        group, _, name = path.rpartition("/")
-        if not isinstance(value, str):
-            arrays[path] = value
-        elif name in RUN_IDS:
-            runs[group] = value
-        elif name == "drive_hold":
-            arrays[path] = np.array(hold_order(value))
-        elif found := _number_in(group, name, value):
-            arrays |= found
-        elif value.strip():
-            texts[path] = value
-    return tables_of_arrays(arrays, "MAT file", runs=runs, texts=texts)
-
-
-def _number_in(group: str, name: str, text: str) -> dict[str, NDArray[np.generic]]:
-    """The number in a text such as ``12 m/s``, by path; empty if there is none."""
-    found = facts_in([f"{name}: {text}"])
-    # A unit may contain the character that separates the parts of a path.
-    return {
-        "/".join(filter(None, (group, one.replace("/", "∕")))): np.array(value)
-        for one, value in found.items()
-    }
+        if isinstance(value, str):
+            found.add_text(path, value)
+        else:
+            found.arrays[path] = value
+    return tables_of_arrays(found, "MAT file")
 
 
 def _leaves(value: object, path: str = "") -> Iterator[tuple[str, NDArray[np.generic] | str]]:
@@ -224,9 +196,9 @@ def _read_tdms(content: bytes, where: str) -> list[Table]:
                 if len(channel) and np.dtype(channel.dtype).kind in "iufb"
             ]
             stated = file.properties | group.properties
-            texts = _tdms_texts(stated)
+            numbers, texts = _tdms_stated(stated)
             for table in aligned_tables(waves, f"TDMS file: group '{group.name}'", "wf_increment"):
-                facts = {**_tdms_numbers(stated), **table.facts}
+                facts = {**numbers, **table.facts}
                 tables.append(replace(table, part=part, facts=facts, texts={**texts, **table.texts}))
     return tables
 
@@ -245,25 +217,21 @@ def _tdms_wave(place: int, channel: Any) -> Waveform:
     since = int(start.astype("datetime64[ns]").astype(np.int64)) if isinstance(start, np.datetime64) else None
     others = {key: value for key, value in properties.items() if key not in (*_TDMS_CLOCK, *_TDMS_UNITS)}
     column = Channel(name, channel[:].astype(np.float64), known_unit(stated) or stated or unit, place)
-    return Waveform(column, increment, offset, since, _tdms_numbers(others), _tdms_texts(others))
+    return Waveform(column, increment, offset, since, *_tdms_stated(others))
 
 
-def _tdms_numbers(properties: Mapping[str, object]) -> dict[str, float]:
-    found: dict[str, float] = {}
+def _tdms_stated(properties: Mapping[str, object]) -> tuple[dict[str, float], dict[str, str]]:
+    """The numbers that properties state, also in texts such as ``12 m/s``, and the other texts."""
+    numbers: dict[str, float] = {}
+    texts: dict[str, str] = {}
     for name, value in properties.items():
         if isinstance(value, int | float | np.number):
-            found[name] = float(value)
-        elif isinstance(value, str):  # such as "12 m/s"
-            found |= facts_in([f"{name}: {value}"])
-    return found
-
-
-def _tdms_texts(properties: Mapping[str, object]) -> dict[str, str]:
-    return {
-        name: value
-        for name, value in properties.items()
-        if isinstance(value, str) and value.strip() and not facts_in([f"{name}: {value}"])
-    }
+            numbers[name] = float(value)
+        elif isinstance(value, str) and (found := facts_in([f"{name}: {value}"])):
+            numbers |= found
+        elif isinstance(value, str) and value.strip():
+            texts[name] = value
+    return numbers, texts
 
 
 HDF5 = Reader("an HDF5 file", limits.DATA_BYTES, (b"\x89HDF",), read_tables=_read_hdf5)

@@ -11,10 +11,10 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from tunnel_sim.files.importing.formats.arrays import RUN_IDS, check_size, tables_of_arrays
-from tunnel_sim.files.importing.formats.layout import Layout, facts_in
+from tunnel_sim.files.importing.formats.arrays import NamedArrays, check_size, tables_of_arrays
+from tunnel_sim.files.importing.formats.layout import Layout
 from tunnel_sim.files.importing.formats.text import tables_of
-from tunnel_sim.files.importing.tables import LEAST_ROWS, Table, by_texts, hold_order, names_runs
+from tunnel_sim.files.importing.tables import LEAST_ROWS, Table, by_texts, names_runs
 from tunnel_sim.files.importing.units import kind_of, known_unit, names_a_time, split_unit
 from tunnel_sim.files.readers import Reader, faults
 from tunnel_sim.files.reading import check_count
@@ -27,16 +27,16 @@ _NAMES = ("columns", "names", "fields", "channels", "header", "spalten")
 
 
 @dataclass(frozen=True)
-class _Found:
-    """The content of a document so far, by path with ``/`` between members."""
+class _Document(NamedArrays):
+    """The content of a document so far.
 
-    arrays: dict[str, NDArray[np.generic]] = field(default_factory=dict)
-    units: dict[str, str] = field(default_factory=dict)
-    runs: dict[str, str] = field(default_factory=dict)
+    Args:
+        labels: name and cells of a column that names the runs, by path.
+        stated: unit that a group states for its readings.
+    """
+
     labels: dict[str, tuple[str, pl.Series]] = field(default_factory=dict)
     stated: dict[str, str] = field(default_factory=dict)
-    """The unit that a group states for its readings."""
-    texts: dict[str, str] = field(default_factory=dict)
 
 
 def _read(content: bytes, where: str) -> list[Table]:
@@ -54,18 +54,18 @@ def _read_lines(content: bytes, where: str) -> list[Table]:
 
 
 def _tables(document: Any, where: str) -> list[Table]:
-    content = _Found()
+    content = _Document()
     _visit(document, "", content)
     check_count(len(content.arrays), limits.COLUMNS, "arrays", where, "leave out arrays that are not needed")
     check_size(sum(array.size for array in content.arrays.values()), where)
-    tables = tables_of_arrays(content.arrays, "JSON file", content.units, content.runs, content.texts)
+    tables = tables_of_arrays(content, "JSON file")
     if not any(table.channels and table.channels[0].values.size >= LEAST_ROWS for table in tables):
         remedy = "write times and angles as arrays by name, or as a list of records"
         raise TunnelError("no arrays of numbers", where=where, remedy=remedy)
     return [part for table in tables for part in _labelled(_in_stated_unit(table, content), content)]
 
 
-def _visit(value: Any, path: str, content: _Found) -> None:
+def _visit(value: Any, path: str, content: _Document) -> None:
     """Find arrays, numbers and texts in a value of the document."""
     if isinstance(value, dict):
         if (indexed := _indexed(value)) is not None:
@@ -78,21 +78,13 @@ def _visit(value: Any, path: str, content: _Found) -> None:
         group, _, name = path.rpartition("/")
         if name.lower() in _UNITS:
             content.stated[group] = known_unit(value) or ""
-        elif name in RUN_IDS:
-            content.runs[group] = value
-        elif name == "drive_hold":
-            content.arrays[path] = np.array(hold_order(value))
-        else:  # such as "12 m/s"
-            numbers = facts_in([f"{name}: {value}"])
-            for heading, number in numbers.items():
-                content.arrays["/".join(filter(None, (group, heading.replace("/", "∕"))))] = np.array(number)
-            if not numbers and value.strip() and name:
-                content.texts[path] = value
+        else:
+            content.add_text(path, value)
     elif isinstance(value, int | float):
         content.arrays[path or "value"] = np.array(float(value))
 
 
-def _visit_members(value: Mapping[str, Any], path: str, content: _Found) -> None:
+def _visit_members(value: Mapping[str, Any], path: str, content: _Document) -> None:
     units = next(
         (entry for key, entry in value.items() if key.lower() in _UNITS and isinstance(entry, dict)), {}
     )
@@ -118,7 +110,7 @@ def _visit_members(value: Mapping[str, Any], path: str, content: _Found) -> None
                 content.units[below] = known_unit(unit) or unit
 
 
-def _visit_list(value: Sequence[Any], path: str, content: _Found) -> None:
+def _visit_list(value: Sequence[Any], path: str, content: _Document) -> None:
     if _are_numbers(value):
         if len(value) > 1:
             content.arrays[path or "column"] = _numbers(value)
@@ -134,7 +126,7 @@ def _visit_list(value: Sequence[Any], path: str, content: _Found) -> None:
             _visit(member, f"{path}[{i}]" if not _describes_itself(member) else f"{path}/{i}", content)
 
 
-def _visit_records(rows: Sequence[Mapping[str, Any]], path: str, content: _Found) -> None:
+def _visit_records(rows: Sequence[Mapping[str, Any]], path: str, content: _Document) -> None:
     """Records with equal members: a column for each member."""
     names = list(dict.fromkeys(name for row in rows for name in row))
     series = []
@@ -156,7 +148,7 @@ def _visit_records(rows: Sequence[Mapping[str, Any]], path: str, content: _Found
             content.labels[path] = column.name, column
 
 
-def _in_stated_unit(table: Table, found: _Found) -> Table:
+def _in_stated_unit(table: Table, found: _Document) -> Table:
     """A table with one reading without a unit; it takes the unit stated by its group, or the document."""
     unit = found.stated.get(table.part) or found.stated.get("", "")
     bare = [c for c in table.channels if not c.unit and not names_a_time(c.name) and not names_runs(c.name)]
@@ -167,7 +159,7 @@ def _in_stated_unit(table: Table, found: _Found) -> Table:
     return replace(table, channels=channels, remarks=(*table.remarks, said))
 
 
-def _labelled(table: Table, found: _Found) -> list[Table]:
+def _labelled(table: Table, found: _Document) -> list[Table]:
     """A table of records run by run where a member names the runs in words."""
     for name, labels in found.labels.values():
         if table.channels and labels.len() == table.channels[0].values.size:
