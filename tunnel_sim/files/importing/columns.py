@@ -23,13 +23,9 @@ from tunnel_sim.files.importing.column_names import (
     named_kind,
     stem,
 )
-from tunnel_sim.files.importing.column_numbers import (
-    Calibration,
-    in_radians,
-    in_seconds,
-    refuse_without_unit,
-)
+from tunnel_sim.files.importing.column_numbers import in_radians, in_seconds, refuse_without_unit
 from tunnel_sim.files.importing.condition_names import condition_of, resembles
+from tunnel_sim.files.importing.import_statements import ImportStatements
 from tunnel_sim.files.importing.inputs import (
     find_input,
     moves_before,
@@ -89,9 +85,7 @@ class Unread(TunnelError):
         self.columns = columns
 
 
-def find_columns(
-    table: Table, choices: ImportChoices, calibration: Calibration | None, where: str
-) -> list[RunColumns]:
+def find_columns(table: Table, beside: ImportStatements, where: str) -> list[RunColumns]:
     """The columns of each run of a table, at least one run; guesses are reported.
 
     Raises:
@@ -99,25 +93,20 @@ def find_columns(
     """
     several: list[TunnelError] = []  # all questions about a file are asked at once
     try:
-        runs = find_pairs(table, choices, where)
+        runs = find_pairs(table, beside.choices, where)
     except Unread as fault:  # the first of several columns that may be the angle, and its questions
         several, runs = [fault], [fault.columns]
-    found = [_as_numbers(table, run, choices, calibration, where, several) for run in runs]
+    found = [_as_numbers(table, run, beside, where, several) for run in runs]
     if len(found) == 1:  # beside several runs, other columns belong to other runs
-        found = [replace(found[0], remarks=(*found[0].remarks, *_unused(table, found[0], choices)))]
+        found = [replace(found[0], remarks=(*found[0].remarks, *_unused(table, found[0], beside.choices)))]
     return found
 
 
 def _as_numbers(
-    table: Table,
-    run: RunColumns,
-    choices: ImportChoices,
-    calibration: Calibration | None,
-    where: str,
-    asked: Sequence[TunnelError],
+    table: Table, run: RunColumns, beside: ImportStatements, where: str, asked: Sequence[TunnelError]
 ) -> RunColumns:
     """The columns of a run in seconds and radians, and its input; ``asked``: questions that are already open."""
-    faults = [*asked]
+    faults, choices, calibration = [*asked], beside.choices, beside.calibration
     clock, channel = run.time.channel, run.reading.channel
     rows, facts = channel.values.size, table.facts
     time = attempt(faults, lambda: in_seconds(clock, rows, facts, choices, where))

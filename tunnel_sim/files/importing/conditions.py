@@ -24,7 +24,7 @@ from tunnel_sim.files.importing.condition_names import (
     resembles,
     units_of,
 )
-from tunnel_sim.files.importing.condition_table import ConditionTable
+from tunnel_sim.files.importing.import_statements import ImportStatements
 from tunnel_sim.files.importing.remarks import ImportRemark, doubt
 from tunnel_sim.files.importing.tables import INPUT_FACTS, Channel, Table
 from tunnel_sim.files.importing.units import claims, known_unit, split_unit
@@ -89,12 +89,12 @@ class Stated:
 
 
 def find_conditions(
-    table: Table, beside: Sequence[Channel], choices: ImportChoices, where: str, freedom: Freedom = ANGLE
+    table: Table, used: Sequence[Channel], choices: ImportChoices, where: str, freedom: Freedom = ANGLE
 ) -> tuple[Stated, list[str]]:
     """The statements of a table about the conditions of its runs, and remarks on them.
 
     Args:
-        beside: the columns with other uses.
+        used: the columns with other uses.
         freedom: freedom of the readings; conditions are stated under its names and in its units.
     """
     claimed = choices.stated_by.model_dump(exclude_none=True)
@@ -102,7 +102,7 @@ def find_conditions(
     columns: dict[str, Channel] = {}
     like = []
     for channel in table.channels:
-        if any(channel is one for one in beside):
+        if any(channel is one for one in used):
             continue
         key = next((key for key, text in claimed.items() if claims(text, channel.name, channel.unit)), None)
         name, unit, factor = freedom.condition(channel.name, channel.unit)
@@ -290,13 +290,12 @@ def conditions_of(
     file: Path,
     run: str,
     rows: NDArray[np.intp],
-    choices: ImportChoices,
-    table: ConditionTable | None,
+    beside: ImportStatements,
     where: str,
 ) -> tuple[dict[str, float], dict[str, float], list[str]]:
     """The conditions of the run in some rows, and the sizes stated beside them, by key; and remarks."""
-    given = choices.conditions.model_dump(include=set(RUN_KEYS), exclude_none=True)
-    in_table = {} if table is None else table.of(file, run)
+    given = beside.choices.conditions.model_dump(include=set(RUN_KEYS), exclude_none=True)
+    in_table = {} if beside.table is None else beside.table.of(file, run)
     # precedence: --set, the table, the name of the file, the columns, and other numbers of the file
     measured, remarks = stated.measured(rows)
     found = {**stated.numbers, **measured, **stated.named, **in_table, **given}
@@ -308,26 +307,15 @@ def conditions_of(
 
 
 def ask_conditions(
-    table: Table,
-    beside: Sequence[Channel],
-    choices: ImportChoices,
-    named: Mapping[str, float],
-    hints: Sequence[Hint],
-    where: str,
-    *,
-    later: bool,
+    table: Table, used: Sequence[Channel], file: Path, beside: ImportStatements, where: str
 ) -> None:
-    """Refuse a table without a condition that only the user can state, before its records are known.
-
-    Args:
-        named: conditions stated by the name of the file, or for the file.
-        hints: conditions that the name of the file seems to state; the other arguments are as above.
-    """
-    stated, _ = find_conditions(table, beside, choices, where)
+    """Refuse a table of a file without a condition that only the user can state, before its records are known."""
+    stated, _ = find_conditions(table, used, beside.choices, where)
     rows = np.arange(table.channels[0].values.size)
-    given = choices.conditions.model_dump(exclude_none=True)
-    known = {**stated.numbers, **stated.measured(rows)[0], **named, **given}
-    open_conditions(known, known, [*stated.unused(rows), *hints], "", where, driven=True, later=later)
+    given = beside.choices.conditions.model_dump(exclude_none=True)
+    known = {**stated.numbers, **stated.measured(rows)[0], **beside.of_file(file), **given}
+    hints = [*stated.unused(rows), *beside.hints[file]]
+    open_conditions(known, known, hints, "", where, driven=True, later=beside.later)
 
 
 _DENSITY = "--set air_density=1.2"

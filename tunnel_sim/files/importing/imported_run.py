@@ -86,7 +86,7 @@ def imported_run(
         reading, remark = from_rest(reading, rest, sensor.unit, where)
         remarks.append(remark)
     rows = raw.rows(float(time[0]), float(time[-1]))
-    stated, sizes, said = conditions_of(raw.stated, raw.source, name, rows, choices, beside.table, where)
+    stated, sizes, said = conditions_of(raw.stated, raw.source, name, rows, beside, where)
     hints = [*raw.stated.unused(rows), *beside.hints[raw.source]]
     named_by = f"{stem_of(raw.source)} {name}"
     driven, common = raw.input is not None, choices.conditions.model_dump()

@@ -96,14 +96,12 @@ def raw_records(source: Source, beside: ImportStatements) -> list[RawRecord]:
     for table in with_readings(long or source.tables, choices, shown(path)):
         where = shown(path) + (f", {one_line(table.part)}" if table.part else "")
         try:
-            runs = find_columns(table, choices, beside.calibration, where)
+            runs = find_columns(table, beside, where)
         except TunnelError as fault:
             faults.append(fault)
             if not isinstance(fault, Unread):
                 break
-            known, hints, used = beside.of_file(path), beside.hints[path], fault.columns.used
-            asked = partial(ask_conditions, table, used, choices, known, hints, where, later=beside.later)
-            attempt(faults, asked)
+            attempt(faults, partial(ask_conditions, table, fault.columns.used, path, beside, where))
             continue
         for columns in runs:
             freedom = FREEDOMS[columns.reading.motion]
