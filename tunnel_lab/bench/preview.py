@@ -17,13 +17,13 @@ from tunnel_lab.bench.parts import asked_in, label_of, name_of, show_command, te
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.files.importing.choices import ImportChoices, read_recipe
 from tunnel_sim.files.importing.condition_names import SETTABLE
+from tunnel_sim.files.importing.imported_run import LEFT_OUT, ImportedRun
 from tunnel_sim.files.importing.remarks import ImportRemark
 from tunnel_sim.files.toml_input import validate
 from tunnel_sim.files.writing import write_whole
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
-    from tunnel_sim.files.importing.imported_run import ImportedRun
     from tunnel_sim.files.importing.raw_records import RawRecord
     from tunnel_sim.files.importing.records import Imported
     from tunnel_sim.vocabulary.record import Array
@@ -35,8 +35,6 @@ CORRECTIONS = tuple(
     key for key in ImportChoices.model_fields if key not in ("leave_out", "stretches", "stated_by")
 )
 """The choices with a field; the others are made in the charts, and by leaving runs out."""
-LEFT_OUT = "left out as stated"
-"""The remark of the importer on a run that the user leaves out."""
 _STILL = 0.01  # share of the range of a run's readings: a smaller range looks flat
 
 
@@ -269,8 +267,8 @@ def drawn(imported: Imported, order: Sequence[str] = ()) -> list[DrawnRecord]:
         time, file, marks = raw.cleaned.file_time_s, raw.source.name, []
         for part in parts:
             start, end = float(time[part.piece.first]), float(time[part.piece.last - 1])
-            fault, of_user = part.remarks[-1] if part.run is None else "", (file, part.id) in added
-            marks.append(Mark(part.id, file, start, end, *_rest(part, unit), fault, doubts[part.id], of_user))
+            judged = part.left_out, doubts[part.id], (file, part.id) in added
+            marks.append(Mark(part.id, file, start, end, *_rest(part, unit), *judged))
         cut = imported.choices.cut and not raw.whole and raw.input is None
         curve = points(time, raw.cleaned.reading)
         records.append(DrawnRecord(raw.id, file, cut, unit, *curve, tuple(marks)))
@@ -279,8 +277,8 @@ def drawn(imported: Imported, order: Sequence[str] = ()) -> list[DrawnRecord]:
 
 def doubts_of(part: ImportedRun) -> tuple[str, ...]:
     """The doubts about the motion of a run for the user to judge, one line each, as stated by the import."""
-    if part.run is None:
-        return () if part.remarks[-1] == LEFT_OUT else (part.remarks[-1],)
+    if part.left_out:
+        return () if part.left_out == LEFT_OUT else (part.left_out,)
     return tuple(
         remark.motion for remark in part.remarks if isinstance(remark, ImportRemark) and remark.motion
     )

@@ -24,6 +24,8 @@ from tunnel_sim.vocabulary.inputs import HOLDS, Hold, Input, without_spring_need
 from tunnel_sim.vocabulary.quantities import Readings, Times
 from tunnel_sim.vocabulary.record import Record
 
+LEFT_OUT = "left out as stated"
+"""The remark on a run that the user leaves out."""
 _JUDGED = 500_000  # number of samples for counting the cycles of a long record
 
 
@@ -43,8 +45,8 @@ class ImportedRun:
     piece: RecordPiece
     run: Run | None
     remarks: tuple[str, ...]
-    rest: float | None
-    sizes: Mapping[str, float]
+    rest: float | None = None
+    sizes: Mapping[str, float] = field(default_factory=dict)
     held: Mapping[str, float] = field(default_factory=dict)
     without_density: bool = False
 
@@ -53,13 +55,13 @@ class ImportedRun:
         """Reading of the run, before its rest is subtracted."""
         return self.raw.cleaned.reading[self.piece.first : self.piece.last]
 
+    @property
+    def left_out(self) -> str:
+        """The remark with the reason for leaving the run out; empty if it is used."""
+        return self.remarks[-1] if self.run is None else ""
 
-def imported_run(
-    name: str,
-    raw: RawRecord,
-    piece: RecordPiece,
-    beside: ImportStatements,
-) -> ImportedRun:
+
+def imported_run(name: str, raw: RawRecord, piece: RecordPiece, beside: ImportStatements) -> ImportedRun:
     """A run of a record.
 
     Args:
@@ -73,10 +75,9 @@ def imported_run(
     stretch = choices.stretch_of(raw.source.name, name)
     piece = stated_piece(raw.cleaned.file_time_s, piece, stretch, where)
     if name in choices.leave_out:
-        return ImportedRun(name, raw, piece, None, ("left out as stated",), None, {})
+        return ImportedRun(name, raw, piece, None, (LEFT_OUT,))
     if piece.doubt:
-        why = doubt(f"left out: {piece.doubt}")
-        return ImportedRun(name, raw, piece, None, (why,), None, {})
+        return ImportedRun(name, raw, piece, None, (doubt(f"left out: {piece.doubt}"),))
     kept, sensor = slice(piece.first, piece.last), raw.sensor
     time, reading = raw.cleaned.time_s[kept], raw.cleaned.reading[kept]
     clock = raw.cleaned.file_time_s[kept]

@@ -145,7 +145,8 @@ def read_records(
     freedom = raws[0].sensor.freedom if raws else ANGLE
     beside = beside.about(freedom) if raws or not faults else beside
     with freedom.errors():
-        parts = _parts(raws, beside, faults)
+        parts, refused = _parts(raws, beside)
+    faults += refused
     if faults:
         raise _refusal(faults)
     if not raws:
@@ -200,11 +201,12 @@ def _campaign_remarks(campaign: Campaign, table: ConditionTable | None) -> list[
 
 
 def _parts(
-    raws: Sequence[RawRecord], beside: ImportStatements, faults: list[TunnelError]
-) -> list[ImportedRun]:
-    """The runs of all records, cut at releases; refusals of other records are added to the faults."""
+    raws: Sequence[RawRecord], beside: ImportStatements
+) -> tuple[list[ImportedRun], list[TunnelError]]:
+    """The runs of all records, cut at releases, and the refusals of others."""
     ids = [raw.id for raw in raws]
-    parts = []
+    parts: list[ImportedRun] = []
+    faults: list[TunnelError] = []
     for at, raw in enumerate(raws):
         label = raw.id if ids.count(raw.id) == 1 else f"{raw.id}-{ids[: at + 1].count(raw.id)}"
         pieces = _pieces(raw, beside.choices)
@@ -214,7 +216,7 @@ def _parts(
         for run, piece in with_added(raw.cleaned.time_s, found, added).items():
             part = attempt(faults, partial(imported_run, run, raw, piece, beside))
             parts += [] if part is None else [part]
-    return parts
+    return parts, faults
 
 
 def _pieces(raw: RawRecord, choices: ImportChoices) -> list[RecordPiece]:
@@ -271,7 +273,7 @@ def _campaign(
     runs = tuple(part.run for part in parts if part.run is not None)
     if not runs:
         part = parts[0]
-        what = f"no run can be used; the first one is {part.remarks[-1]}"
+        what = f"no run can be used; the first one is {part.left_out}"
         remedy = "check --time, --time-unit, --rate, --angle and --unit, or keep it whole with --no-cut"
         raise TunnelError(what, where=f"{shown(part.raw.source)}, run '{part.id}'", remedy=remedy)
     open_density = any(part.without_density for part in parts)
