@@ -22,7 +22,14 @@ from tunnel_sim.files.plan_file import (
 )
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.files.scatter_tables import Drift, Width, ZeroWidth
-from tunnel_sim.files.toml_input import NotNegative, OneLine, Positive, SampleRate, StrictModel
+from tunnel_sim.files.toml_input import (
+    NotNegative,
+    OneLine,
+    Positive,
+    SampleRate,
+    StrictModel,
+    optional,
+)
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.plan import DEFAULT_SAMPLE_RATE
 
@@ -44,7 +51,7 @@ class SweepRigTable(StrictModel):
     """``[[rig]]``: a rig description with changes; the packaged description if no file is named."""
 
     name: OneLine = Field(default="packaged", description="a short name in quotes")
-    file: OneLine | None = Field(default=None, description="the path of a rig description in quotes")
+    file: OneLine | None = optional("the path of a rig description in quotes")
     changes: dict[str, dict[str, Any]] = Field(
         default={}, description="tables of the rig description, such as { dynamics = { yaw_inertia = 0.12 } }"
     )
@@ -55,27 +62,19 @@ class TruthAxis(StrictModel):
 
     cn_beta: Many[float] = Field(description="a number or a list of them, 1/rad")
     cn_r: Many[float] = Field(description="a number or a list of them, 1/rad")
-    yaw_inertia: Many[Positive] | None = Field(
-        default=None, description="a positive number or a list of them, kg m2"
-    )
-    mechanical_damping: Many[NotNegative] | None = Field(
-        default=None, description="a number or a list of them, N m s/rad, zero or more"
+    yaw_inertia: Many[Positive] | None = optional("a positive number or a list of them, kg m2")
+    mechanical_damping: Many[NotNegative] | None = optional(
+        "a number or a list of them, N m s/rad, zero or more"
     )
 
 
 class SensorAxis(StrictModel):
     """``[sensor]`` or ``[[sensor]]``: the potentiometer, each key a number or a list."""
 
-    sample_rate: Many[SampleRate] | None = Field(
-        default=None, description="a positive number or a list of them, Hz"
-    )
-    noise_std: Many[NotNegative] | None = Field(
-        default=None, description="a number or a list of them, rad, zero or more"
-    )
-    resolution: Many[NotNegative] | None = Field(
-        default=None, description="a number or a list of them, rad, zero for none"
-    )
-    zero: Many[float] | None = Field(default=None, description="a number or a list of them, rad")
+    sample_rate: Many[SampleRate] | None = optional("a positive number or a list of them, Hz")
+    noise_std: Many[NotNegative] | None = optional("a number or a list of them, rad, zero or more")
+    resolution: Many[NotNegative] | None = optional("a number or a list of them, rad, zero for none")
+    zero: Many[float] | None = optional("a number or a list of them, rad")
 
 
 _WIDTHS = "a relative standard deviation or a list of them, from 0 to 0.2"
@@ -85,14 +84,12 @@ _DRIFTS = "a relative change from the first to the last run or a list of them, f
 class ScatterAxis(StrictModel):
     """``[scatter]`` or ``[[scatter]]``: differences between the runs, each key a number or a list."""
 
-    wind_speed: Many[Width] | None = Field(default=None, description=_WIDTHS)
-    spring_stiffness: Many[Width] | None = Field(default=None, description=_WIDTHS)
-    mechanical_damping: Many[Width] | None = Field(default=None, description=_WIDTHS)
-    zero: Many[ZeroWidth] | None = Field(
-        default=None, description="a standard deviation from 0 to 1 rad or a list of them"
-    )
-    spring_stiffness_drift: Many[Drift] | None = Field(default=None, description=_DRIFTS)
-    wind_speed_drift_between_runs: Many[Drift] | None = Field(default=None, description=_DRIFTS)
+    wind_speed: Many[Width] | None = optional(_WIDTHS)
+    spring_stiffness: Many[Width] | None = optional(_WIDTHS)
+    mechanical_damping: Many[Width] | None = optional(_WIDTHS)
+    zero: Many[ZeroWidth] | None = optional("a standard deviation from 0 to 1 rad or a list of them")
+    spring_stiffness_drift: Many[Drift] | None = optional(_DRIFTS)
+    wind_speed_drift_between_runs: Many[Drift] | None = optional(_DRIFTS)
 
 
 class EffectAxis(StrictModel):
@@ -110,14 +107,14 @@ class EffectAxis(StrictModel):
 class ConditionsTable(StrictModel):
     """``[conditions]`` or ``[[conditions]]``: the runs of a campaign; each table, and each duration, is one."""
 
-    name: OneLine | None = Field(default=None, description="a short name in quotes")
+    name: OneLine | None = optional("a short name in quotes")
     springs: Springs = Field(default=[])
     spring_stiffness: Stiffnesses = Field(default=[])
     wind_speeds: WindSpeeds
     release_angles_deg: ReleaseAngles
     repeats: Repeats = 1
     duration: Many[Positive] = Field(description="a positive number or a list of them, s")
-    air_density: Positive | None = Field(default=None, description="a positive number in kg/m3")
+    air_density: Positive | None = optional("a positive number in kg/m3")
 
 
 class SweepDocument(StrictModel):

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from tunnel_sim.files.run_files import read_input
-from tunnel_sim.files.toml_input import OneLine, Positive, StrictModel
+from tunnel_sim.files.toml_input import OneLine, Positive, StrictModel, optional
 from tunnel_sim.vocabulary.errors import TunnelError, one_of
 from tunnel_sim.vocabulary.input_kinds import INPUTS, KINDS, InputColumn
 from tunnel_sim.vocabulary.inputs import Hold, Input
@@ -59,14 +59,12 @@ class InputTable(StrictModel):
         description="mass times arm of a base that is accelerated, a number other than 0 in kg m",
     )
     hold: Hold = Field(default="linear", description="'zero' or 'linear', between the samples")
-    frequency_hz: Positive | None = Field(default=None, description="a positive number in Hz")
+    frequency_hz: Positive | None = optional("a positive number in Hz")
     frequencies_hz: list[Positive] = Field(default=[], description="a list of positive numbers in Hz")
-    from_hz: Positive | None = Field(default=None, description="a positive number in Hz")
-    to_hz: Positive | None = Field(default=None, description="a positive number in Hz")
+    from_hz: Positive | None = optional("a positive number in Hz")
+    to_hz: Positive | None = optional("a positive number in Hz")
     seed: int | None = Field(default=None, ge=0, description="a whole number, zero or more")
-    file: OneLine | None = Field(
-        default=None, description=f"a CSV or Parquet file with time_s, and {_COLUMNS}"
-    )
+    file: OneLine | None = optional(f"a CSV or Parquet file with time_s, and {_COLUMNS}")
 
     @property
     def amplitudes(self) -> tuple[float | None, ...]:
