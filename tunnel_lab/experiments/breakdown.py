@@ -21,6 +21,7 @@ from identification.estimate import PARAMETERS
 from identification.show.blocks import Paragraph, TextTable
 from identification.show.numbers import listed, significant
 from identification.show.style import figure, styled
+from tunnel_lab.experiments.bounds import coefficients_bound
 from tunnel_lab.experiments.estimate_rows import counted_failures, not_given
 from tunnel_lab.experiments.experiment import RESULTS, Done, Experiment, parquet
 from tunnel_lab.experiments.score import ANSWER_COLUMNS, answer_rows
@@ -136,8 +137,6 @@ def make_cases(
         duration: duration of every run, s.
         show_steps: whether to show the progress of sizing on standard error.
     """
-    from identification.uncertainty.cramer_rao import campaign_bound
-
     conditions = conditions_of(seed, duration=duration)
     nothing = CampaignDraw("none", conditions, (), 0)
     sized = size_effects(
@@ -155,9 +154,7 @@ def make_cases(
             motion = next(motions)
         simulated = read_and_fit(draw, motion)
         campaign = as_campaign(simulated, "breakdown")
-        starts = [(float(angle), 0.0) for angle in draw.conditions.start_angle]
-        noise = float(np.sqrt(draw.conditions.noise_power))
-        bound = campaign_bound(campaign, TRUTH, noise_std=noise, initial_states=starts)
+        starts, noise = draw.conditions.start_angle.tolist(), float(np.sqrt(draw.conditions.noise_power))
         cases.append(
             BiasCase(
                 effect=draw.effects[0].form.family if draw.effects else NOTHING_ADDED,
@@ -167,7 +164,7 @@ def make_cases(
                 trial=ScoreTrial(
                     campaign,
                     truth=vars(TRUTH) | (in_phase(draw) or {}),
-                    bound={name: bound.std(name) for name in PARAMETERS},
+                    bound=coefficients_bound(campaign, TRUTH, starts, noise),
                 ),
             )
         )
