@@ -15,7 +15,7 @@ from nicegui import ui
 from tunnel_lab.bench.fields import Changed, field_of
 from tunnel_lab.bench.parts import asked_in, label_of, name_of, show_command, text_of
 from tunnel_lab.bench.workspace import Session
-from tunnel_sim.files.importing.choices import ImportChoices, read_recipe
+from tunnel_sim.files.importing.choices import ImportChoices, read_recipe, stated_settings
 from tunnel_sim.files.importing.condition_names import SETTABLE
 from tunnel_sim.files.importing.imported_run import LEFT_OUT, ImportedRun
 from tunnel_sim.files.importing.remarks import ImportRemark
@@ -128,15 +128,8 @@ def settings_from(text: str | None) -> dict[str, Any]:
     Raises:
         TunnelError: when the text is not in this format.
     """
-    from tunnel_sim.files.importing.choices import parse_setting
-
-    if not (text or "").strip():
-        return {"conditions": None, "stated_by": None}
-    numbers, names = parse_setting(text or "", name_of(ImportChoices, "conditions"))
-    return {
-        "conditions": numbers.model_dump(exclude_none=True),
-        "stated_by": names.model_dump(exclude_none=True),
-    }
+    words = [text] if text and text.strip() else []
+    return stated_settings(words, name_of(ImportChoices, "conditions"))
 
 
 def move(session: Session, mark: Mark, places: Mapping[str, float | None]) -> None:

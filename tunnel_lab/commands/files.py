@@ -118,23 +118,17 @@ class StatedChoices:
         """The choices of the recipe, replaced if an option states another."""
         from tunnel_sim.files.importing.choices import (
             ImportChoices,
-            parse_setting,
             parse_times,
             read_recipe,
+            stated_settings,
         )
         from tunnel_sim.files.toml_input import validate
 
-        numbers: dict[str, float] = {}
-        names: dict[str, str] = {}
-        for word in self.settings:
-            conditions, columns = parse_setting(word, "--set")
-            numbers |= conditions.model_dump(exclude_none=True)
-            names |= columns.model_dump(exclude_none=True)
+        settings = stated_settings(self.settings, "--set")
         ends = {key: parse_times(getattr(self, key), f"--{key}") for key in ("start", "end")}
         kept = {} if self.recipe is None else read_recipe(self.recipe).model_dump(exclude_defaults=True)
         others = {"table", "settings", "recipe"}
-        stated = {name: value for name, value in vars(self).items() if name not in others}
-        stated |= {"conditions": numbers or None, "stated_by": names or None}
+        stated = {name: value for name, value in vars(self).items() if name not in others} | settings
         stretches: dict[str, dict[str, Any]] = {}
         for key, times in ends.items():
             stated[key] = times.pop("", None)
@@ -142,7 +136,7 @@ class StatedChoices:
                 stretches.setdefault(run, {"run": run})[key] = time
         if stretches:
             stated["stretches"] = (*stretches.values(), *kept.get("stretches", ()))
-        given = {name: value for name, value in stated.items() if value not in (None, ())}
+        given = {name: value for name, value in stated.items() if value not in (None, (), {})}
         return validate(ImportChoices, kept | given, Path("options"))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal
@@ -232,3 +232,12 @@ def parse_setting(text: str, where: str) -> tuple[Conditions, StatedBy]:
                 if motion is not None:
                     numbers["motion"] = motion
     return validate(Conditions, numbers, Path(where)), validate(StatedBy, names, Path(where))
+
+
+def stated_settings(words: Iterable[str], where: str) -> dict[str, dict[str, Any]]:
+    """The choices ``conditions`` and ``stated_by`` from words for `parse_setting`; the last of a key counts."""
+    found: dict[str, dict[str, Any]] = {"conditions": {}, "stated_by": {}}
+    for word in words:
+        for table, stated in zip(found.values(), parse_setting(word, where), strict=True):
+            table |= stated.model_dump(exclude_none=True)
+    return found
