@@ -60,8 +60,7 @@ def _columns(file: Any, number: int, name: str, clock: int, where: str) -> Stamp
         clock: index of the master channel.
     """
     group = file.groups[number]
-    columns: dict[str, np.ndarray] = {}
-    units: dict[str, str] = {}
+    channels: dict[str, Channel] = {}
     facts: dict[str, float] = {}
     time_s = np.empty(0)
     for index, stated in enumerate(group.channels):
@@ -83,13 +82,12 @@ def _columns(file: Any, number: int, name: str, clock: int, where: str) -> Stamp
         if size == 1:
             facts[f"{label} [{unit}]" if unit else label] = float(values[0])
             continue
-        label = label if label not in columns else f"{label} {index}"
-        columns[label], units[label] = values, unit
+        label = label if label not in channels else f"{label} {index}"
+        channels[label] = Channel(label, values, unit)
         time_s = signal.timestamps.astype(np.float64)
-    time_s, columns, repeated = in_order(time_s, columns)
+    time_s, ordered, repeated = in_order(time_s, list(channels.values()))
     remarks = [f"'{name}': {counted(repeated, 'sample')} at a repeated time left out"] if repeated else []
-    channels = tuple(Channel(label, values, units[label]) for label, values in columns.items())
-    return StampedColumns(name, time_s, channels, tuple(remarks), facts)
+    return StampedColumns(name, time_s, ordered, tuple(remarks), facts)
 
 
 MDF = Reader("an MDF file", limits.DATA_BYTES, (_MAGIC, b"UnFinMF "), read_tables=_read)

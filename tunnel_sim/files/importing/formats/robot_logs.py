@@ -252,18 +252,18 @@ def _clocks(topics: Sequence[_Topic]) -> list[StampedColumns]:
     origin = min(int(one.min()) for one in used)
     clocks = []
     for topic, stamps, delay, own in zip(topics, used, late, headed, strict=True):
-        rows: dict[str, np.ndarray] = {}
-        for name, (_, at, values) in topic.columns.items():
-            rows[name] = np.full(stamps.size, np.nan)
-            rows[name][at] = values
+        columns = []
+        for name, (unit, at, numbers) in topic.columns.items():
+            values = np.full(stamps.size, np.nan)
+            values[at] = numbers
+            columns.append(Channel(name, values, unit))
         # a quotient is the nearest number to the decimal fraction, like the same time in a text
-        time_s, rows, repeated = in_order((stamps - origin) / 1e9, rows)
+        time_s, channels, repeated = in_order((stamps - origin) / 1e9, columns)
         remarks = [_of_stamps(topic, delay, own, mixed=mixed, several=len(topics) > 1)]
         if repeated:
             remarks.append(
                 f"'{topic.name}': {counted(repeated, 'message')} with the stamp of the next one left out"
             )
-        channels = tuple(Channel(name, rows[name], unit) for name, (unit, _, _) in topic.columns.items())
         clocks.append(StampedColumns(topic.name, time_s, channels, tuple(remarks)))
     return clocks
 

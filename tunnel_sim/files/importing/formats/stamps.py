@@ -52,12 +52,12 @@ class StampedColumns:
         return float(np.median(np.diff(self.time_s))) if self.time_s.size > 1 else 0.0
 
 
-def in_order(time_s: Times, columns: Mapping[str, Rows]) -> tuple[Times, dict[str, Rows], int]:
+def in_order(time_s: Times, channels: Sequence[Channel]) -> tuple[Times, tuple[Channel, ...], int]:
     """Stamps in their order with their columns, each stamp once with its last values; and the number left out."""
     order = np.argsort(time_s, kind="stable")
     time_s = time_s[order]
     last = np.append(np.diff(time_s) > 0.0, np.ones(min(1, time_s.size), dtype=bool))
-    ordered = {name: values[order][last] for name, values in columns.items()}
+    ordered = tuple(replace(channel, values=channel.values[order][last]) for channel in channels)
     return time_s[last], ordered, int(time_s.size - last.sum())
 
 
