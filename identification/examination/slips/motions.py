@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from identification import policy
 from identification.examination.self_excited import Swing
+from identification.examination.slips.fits import Statements
 from tunnel_sim.vocabulary.between_runs import USUAL_SCATTER
 from tunnel_sim.vocabulary.quantities import Vector
 from tunnel_sim.vocabulary.record import Array
@@ -73,31 +74,26 @@ class MeasuredMotions:
     @classmethod
     def of(cls, swings: Sequence[Swing]) -> MeasuredMotions:
         """The runs, all of which state their spring and decay."""
-        runs = [swing.run for swing in swings]
-        stated = np.array([run.spring_stiffness or 1.0 for run in runs])
-        values, place = np.unique(stated, return_inverse=True)
-        given = [run.air_density for run in runs if run.air_density is not None]
-        usual = float(np.median(given)) if given else 1.2
-        stiffness, rate = (np.array([getattr(s, key) for s in swings]) for key in ("stiffness", "rate"))
-        ones = np.ones(len(runs))
-        conditions = RunConditions(
-            spring=ones,
-            speed=np.array([run.wind_speed for run in runs]),
-            density=np.array([usual if run.air_density is None else run.air_density for run in runs]),
-            clock=ones,
-            moment=ones,
-            lag=np.zeros(len(runs)),
-        )
+        labels, ones = Statements.of(swings), np.ones(len(swings))
+        values, place = np.unique(labels.spring, return_inverse=True)
+        rate = np.array([swing.rate for swing in swings])
         return cls(
             tuple(swings),
-            stiffness,
-            np.maximum([s.stiffness_std for s in swings], policy.LEAST_STIFFNESS_STD * stiffness),
+            labels.recorded,
+            np.maximum([s.stiffness_std for s in swings], policy.LEAST_STIFFNESS_STD * labels.recorded),
             rate,
             np.hypot([s.rate_error for s in swings], policy.LEAST_DAMPING_STD * rate),
-            stated,
+            labels.spring,
             np.asarray(place, np.intp),
             values.size,
-            conditions,
+            RunConditions(
+                spring=ones,
+                speed=labels.speed,
+                density=labels.density,
+                clock=labels.clock,
+                moment=ones,
+                lag=np.zeros(len(swings)),
+            ),
         )
 
 
