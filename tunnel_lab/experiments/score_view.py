@@ -184,11 +184,6 @@ def summary_tables(results: Results) -> list[TextTable]:
     ]
 
 
-def cell_tables(results: Results) -> list[TextTable]:
-    """One table for each cell: a section for each estimator, a row for each quantity."""
-    return [_table(results, cell.label, CELL, [index]) for index, cell in enumerate(results.grid.cells)]
-
-
 def _table(results: Results, title: str, columns: Sequence[ScoreColumn], cells: Sequence[int]) -> TextTable:
     rows = []
     for name in results.estimators:
@@ -210,9 +205,10 @@ def score_view(results: Results, *, cells: bool = False) -> ExperimentView:
     """
     from tunnel_lab.experiments.score_drawing import score_figure
 
+    every = (_table(results, cell.label, CELL, [index]) for index, cell in enumerate(results.grid.cells))
     return ExperimentView(
         f"Score on the grid {results.grid.name}",
-        [*summary_tables(results), *(cell_tables(results) if cells else ()), *notes_below(results)],
+        [*summary_tables(results), *(every if cells else ()), *notes_below(results)],
         {"score": partial(score_figure, results)},
         {"scores.parquet": parquet(scores_frame(results))},
     )

@@ -48,7 +48,9 @@ def refuse_records(path: Path) -> None:
     if not path.is_dir() or any((one / CAMPAIGN_FILE).exists() for one in (path, path.resolve().parent)):
         return
     found = [one for one in sorted(path.iterdir()) if one.is_file() and one.name[0] != "."]
-    endings = Counter(one.suffix for one in found if _may_be_record(one))
+    endings = Counter(
+        one.suffix for one in found if one.suffix.lower() in _TEXT or reader_place(one.suffix.lower())
+    )
     if not endings:
         return
     from tunnel_sim.files.importing.records import read_records
@@ -65,9 +67,3 @@ def refuse_records(path: Path) -> None:
     command = f"tunnel import {shlex.quote(str(path))}/*{ending} --out {out}{options}"
     what = f"is a folder of {counted(count, 'record')} ({ending}), not a campaign"
     raise TunnelError(what, where=shown(path), remedy=f"import it: {command}{asked}")
-
-
-def _may_be_record(path: Path) -> bool:
-    """Whether the import reads files with this ending."""
-    ending = path.suffix.lower()
-    return ending in _TEXT or reader_place(ending) is not None

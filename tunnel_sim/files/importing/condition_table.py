@@ -46,7 +46,8 @@ class ConditionTable:
         self.displaced = one_line(names[min(own)], 40) if own else ""
         split = [own[i][:2] if i in own else heading for i, heading in enumerate(split)]
         keys = [condition_of(*heading, alone=True) or resembles(*heading) for heading in split]
-        self._key = next((i for i, name in enumerate(names) if _names_a_run(name)), None)
+        of_runs = (names_runs(name) or _OF_FILES.fullmatch(name.strip()) for name in names)
+        self._key = next((i for i, of_run in enumerate(of_runs) if of_run), None)
         used = {key: i for i, key in enumerate(keys) if key in RUN_KEYS}
         if self._key is None or not used:
             wanted = "file or run" if self._key is None else "of conditions"
@@ -99,7 +100,3 @@ def _of_displacement(heading: tuple[str, str]) -> tuple[str, str, float] | None:
     if (name, unit) == heading or key not in RUN_KEYS or in_si(key, unit) is None:
         return None
     return name, unit, factor
-
-
-def _names_a_run(heading: str) -> bool:
-    return names_runs(heading) or _OF_FILES.fullmatch(heading.strip()) is not None

@@ -90,7 +90,9 @@ def find_runs(time_s: Times, reading: PerSample, drift: float = 0.0) -> list[Rec
             end = _without_long_rest(time_s, 0, int(moved))
     swings = swings_of(time_s, reading, half, drift)
     found = [] if swings is None else _judged(_decays(swings), swings, reading)
-    if swings is None or not found or (len(found) == 1 and found[0].goes_on(swings)):
+    if swings is None or not found:
+        return [RecordPiece(0, end)]
+    if len(found) == 1 and found[0].whole and found[0].stopped(swings) is None:  # nothing acts on the body
         return [RecordPiece(0, end)]
     return [_piece(time_s, reading, swings, *pair) for pair in zip(found, [*found[1:], None], strict=True)]
 
@@ -119,10 +121,6 @@ class _Decay:
     def whole(self) -> bool:
         """Whether no hand acts before the decay."""
         return self.hand < 0
-
-    def goes_on(self, swings: Swings) -> bool:
-        """Whether nothing acts on the body before and during the motion."""
-        return self.whole and self.stopped(swings) is None
 
     def stopped(self, swings: Swings) -> int | None:
         """The last extreme before the motion is ended while still swinging; None if it dies out."""

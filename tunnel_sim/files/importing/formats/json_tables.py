@@ -123,7 +123,8 @@ def _visit_list(value: Sequence[Any], path: str, content: _Document) -> None:
     else:
         # members of the group above: channels with their own descriptions, or a group for each run
         for i, member in enumerate(value, 1):
-            _visit(member, f"{path}[{i}]" if not _describes_itself(member) else f"{path}/{i}", content)
+            described = isinstance(member, dict) and isinstance(member.get("name"), str)
+            _visit(member, f"{path}/{i}" if described else f"{path}[{i}]", content)
 
 
 def _visit_records(rows: Sequence[Mapping[str, Any]], path: str, content: _Document) -> None:
@@ -171,10 +172,6 @@ def _indexed(value: Mapping[str, Any]) -> list[Any] | None:
     """The values of a mapping from row numbers, as some programs write a column; None for any other."""
     numbered = len(value) >= LEAST_ROWS and all(key.isdigit() for key in value)
     return list(value.values()) if numbered else None
-
-
-def _describes_itself(value: Any) -> bool:
-    return isinstance(value, dict) and isinstance(value.get("name"), str)
 
 
 def _is_flat(row: Mapping[str, Any]) -> bool:

@@ -174,10 +174,9 @@ def _add(topic: _Topic, log_ns: int, raw: bytes, decoders: dict[str, Any], where
     topic.log_ns.append(log_ns)
     topic.header_ns.append(header_ns)
     above = ("command",) if topic.type == _TRAJECTORY else ()
+    joints = next((getattr(message, key) for key in _NAMES if hasattr(message, key)), ())
     for point in points:
-        for label, unit, value in _numbers(
-            point, _joints(message), above, plain=topic.type.startswith(_PLAIN)
-        ):
+        for label, unit, value in _numbers(point, joints, above, plain=topic.type.startswith(_PLAIN)):
             name = f"{topic.name.lstrip('/')}{label}"
             _, rows, values = topic.columns.setdefault(name, (unit, [], []))
             rows.append(at)
@@ -200,11 +199,6 @@ def _decoder(topic: _Topic, where: str) -> Any:
     else:
         store = types.get_typestore(types.Stores.ROS2_HUMBLE)
     return (lambda raw: store.deserialize_cdr(raw, kind)) if kind in store.fielddefs else None
-
-
-def _joints(message: Any) -> Sequence[str]:
-    """The names of the joints of a message."""
-    return next((getattr(message, key) for key in _NAMES if hasattr(message, key)), ())
 
 
 def _numbers(

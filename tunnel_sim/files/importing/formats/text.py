@@ -191,7 +191,8 @@ def frame_of(
             return pl.read_csv(content, schema=all_texts, columns=[at], **options)
         # where commas are decimal, points may separate thousands: each column shows whether they do
         quoted = dialect.delimiter == dialect.decimal
-        exact = quoted or (dialect.decimal == "," and _has_points(content, layout.first))
+        body = _start_of(content, layout.first)
+        exact = quoted or (dialect.decimal == "," and content.find(b".", body) >= 0)
         kinds = {name: pl.String if exact or i in texts else pl.Float64 for i, name in enumerate(names)}
         numbers = {**options, "decimal_comma": dialect.decimal == ","}
         if not (quoted or set(texts) - {layout.runs}):  # a text may contain delimiters in quotes
@@ -203,11 +204,6 @@ def frame_of(
     except pl.exceptions.PolarsError as error:
         what = f"not a table of text ({one_line(error, 60)})"
         raise TunnelError(what, where=where, remedy="give every line one value for each column") from None
-
-
-def _has_points(content: bytes, first: int) -> bool:
-    """Whether a table has a point in a row of numbers, the first of which is given."""
-    return content.find(b".", _start_of(content, first)) >= 0
 
 
 def _start_of(content: bytes, line: int) -> int:

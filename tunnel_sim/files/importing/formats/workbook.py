@@ -48,11 +48,6 @@ class _Sheet:
         headed = "names in the row above the numbers" if self.layout.headed else "no names of columns"
         return f"{counted(self.width, 'column')}, numbers from row {self.layout.first + 1}, {headed}"
 
-    @property
-    def is_record(self) -> bool:
-        """Whether the sheet has as many rows of numbers as a record."""
-        return self.layout is not None and len(self.rows) - self.layout.first >= LEAST_ROWS
-
 
 def _read(content: bytes, where: str) -> list[Table]:
     """The tables of a workbook, one for each sheet, or one for each run in it."""
@@ -61,7 +56,7 @@ def _read(content: bytes, where: str) -> list[Table]:
         _check_archive(content, where)
         book = fastexcel.read_excel(content)
         sheets = [_sheet(book, name, where) for name in book.sheet_names]
-        records = [sheet for sheet in sheets if sheet.is_record]
+        records = [one for one in sheets if one.layout and len(one.rows) - one.layout.first >= LEAST_ROWS]
         others = [sheet for sheet in sheets if sheet not in records] if records else []
         alike: dict[str, list[str]] = {}
         for sheet in records or sheets:
