@@ -14,7 +14,7 @@ from tunnel_lab.bench.parts import Fault, Frame, label_of, name_of, page_words, 
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.files.campaign_folder import CAMPAIGN_FILE, NO_CAMPAIGN, parse_document, read_campaign
 from tunnel_sim.files.importing.condition_names import RIG_KEYS, RUN_KEYS, Conditions
-from tunnel_sim.files.importing.writing import ORIGINAL, campaign_text
+from tunnel_sim.files.importing.writing import NEEDED, ORIGINAL, STIFFNESS_OF_JOINT, campaign_text
 from tunnel_sim.files.plausible import plausible_values
 from tunnel_sim.files.reading import read_json
 from tunnel_sim.files.toml_input import load_toml, one_line, validate
@@ -30,14 +30,6 @@ Words = dict[tuple[str, str], str]
 """Faults by row and key: one line for each cell."""
 RIG = ""
 """The row of the rig's sizes: no run has an empty name."""
-MISSING = {
-    "spring_stiffness": "needed for Izz, Cr, Cnβ and Cnr; without it a run gives ωn and ζ",
-    "frontal_area": "needed for Cnβ and Cnr",
-    "reference_length": "needed for Cnβ and Cnr",
-}
-"""Consequences of missing values; the other keys are optional, or required (`faults`)."""
-_OF_JOINT = "0 for a joint without a spring"
-"""The stiffness of a driven run in still air."""
 _DENSITY = "air_density"
 _MOST_ROWS = 20  # in a table without a scroll bar
 _MOST_LINES = 8  # maximum number of listed faults
@@ -371,12 +363,12 @@ class ConditionsPage:
         cells = self._cells
         wrong = save(self._session, cells)
         windy = any(cells[run].get("wind_speed", "").strip() not in ("", "0") for run in self._runs)
-        words = MISSING | ({"spring_stiffness": _OF_JOINT} if self._driven and not windy else {})
+        words = NEEDED | ({"spring_stiffness": STIFFNESS_OF_JOINT} if self._driven and not windy else {})
         missing = {
             (row, key): self._freedom.words(words[key])
             for row, texts in cells.items()
             for key, text in texts.items()
-            if key in MISSING and not text.strip() and (row != RIG or windy)
+            if key in NEEDED and not text.strip() and (row != RIG or windy)
         }
         why = missing | wrong
         self._grid.options["rowData"] = [

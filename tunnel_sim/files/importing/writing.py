@@ -15,9 +15,17 @@ from tunnel_sim.vocabulary.errors import one_line
 from tunnel_sim.vocabulary.freedom import FREEDOMS
 
 _AS_TEXT = 1_000_000  # samples: a larger campaign is written as Parquet
+NEEDED = {
+    "spring_stiffness": "needed for Izz, Cr, Cnβ and Cnr; without it a run gives ωn and ζ",
+    "frontal_area": "needed for Cnβ and Cnr",
+    "reference_length": "needed for Cnβ and Cnr",
+}
+"""Consequences of unstated values."""
+STIFFNESS_OF_JOINT = "0 for a joint without a spring"
+"""The stiffness of a driven run in still air."""
 _RIG = {
-    "frontal_area": "m2: needed for Cnβ and Cnr",
-    "reference_length": "m: needed for Cnβ and Cnr",
+    "frontal_area": f"m2: {NEEDED['frontal_area']}",
+    "reference_length": f"m: {NEEDED['reference_length']}",
     "yaw_inertia": "kg m2, nominal Izz of model and support; optional",
     "width": "m, for Strouhal numbers; optional",
 }
@@ -26,7 +34,7 @@ _REPEATABILITY = (
     "#                   # deviation between runs, relative, such as 0.003\n"
 )
 _RUN = {
-    "spring_stiffness": "N m/rad: needed for Izz, Cr, Cnβ and Cnr; without it a run gives ωn and ζ",
+    "spring_stiffness": f"N m/rad: {NEEDED['spring_stiffness']}",
     "air_density": "kg/m3: needed for Cnβ and Cnr",
     "release_angle": "rad, nominal; optional",
 }
@@ -37,7 +45,7 @@ _OF_INPUT = {
 }
 _RIG_OF_JOINT = {"yaw_inertia": "kg m2, nominal inertia about the joint; optional"}
 _RUN_OF_JOINT = {
-    "spring_stiffness": "N m/rad: 0 for a joint without a spring",
+    "spring_stiffness": f"N m/rad: {STIFFNESS_OF_JOINT}",
     **_OF_INPUT,
 }
 """Comments for driven runs in still air, which give no aerodynamic coefficient."""
