@@ -4,76 +4,52 @@ from __future__ import annotations
 
 import numpy as np
 
+from identification.examination.slips import (
+    compared_labels,
+    factors,
+    instruments,
+    odd_sensors,
+    run_labels,
+    spoilt_records,
+    statements,
+)
 from identification.examination.slips.base import RecordSlip, SlipEvidence, StatementSlip
-from identification.examination.slips.compared_labels import (
-    inertia_off_the_springs,
-    labels_exchanged,
-    spring_off_the_line,
-    springs_renumbered,
-)
-from identification.examination.slips.factors import wrong_factor
-from identification.examination.slips.instruments import coupled_sensor, drifting_clock
-from identification.examination.slips.odd_sensors import (
-    angle_in_degrees,
-    mirrored_run,
-    odd_gain,
-    odd_noise,
-    release_on_the_other_side,
-)
-from identification.examination.slips.run_labels import wrong_label, wrong_labels
-from identification.examination.slips.spoilt_records import (
-    clock_jumps,
-    code_for_missing,
-    constant_tail,
-    repeated_record,
-    resolution_too_coarse,
-    stuck_reading,
-    wrapped_angle,
-)
-from identification.examination.slips.statements import (
-    equal_statements_differ,
-    inertia_of_no_body,
-    motion_grows,
-    wind_exchanged,
-    wind_not_seen,
-    yaw_moment_too_large,
-)
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign
 
 #: Slips to be found in the records as given.
 RECORD_SLIPS: tuple[RecordSlip, ...] = (
-    code_for_missing,
-    clock_jumps,
-    repeated_record,
-    wrapped_angle,
-    resolution_too_coarse,
-    constant_tail,
-    stuck_reading,
+    spoilt_records.code_for_missing,
+    spoilt_records.clock_jumps,
+    spoilt_records.repeated_record,
+    spoilt_records.wrapped_angle,
+    spoilt_records.resolution_too_coarse,
+    spoilt_records.constant_tail,
+    spoilt_records.stuck_reading,
 )
 
 #: Slips to be found in the measured oscillations; the search ends at the first refusal.
 STATEMENT_SLIPS: tuple[StatementSlip, ...] = (
-    motion_grows,
-    angle_in_degrees,
-    odd_gain,
-    odd_noise,
-    springs_renumbered,
-    wrong_factor,
-    wrong_label,
-    wrong_labels,
-    labels_exchanged,
-    equal_statements_differ,
-    wind_exchanged,
-    coupled_sensor,
-    drifting_clock,
-    mirrored_run,
-    wind_not_seen,
-    yaw_moment_too_large,
-    spring_off_the_line,
-    inertia_off_the_springs,
-    inertia_of_no_body,
-    release_on_the_other_side,
+    statements.motion_grows,
+    odd_sensors.angle_in_degrees,
+    odd_sensors.odd_gain,
+    odd_sensors.odd_noise,
+    compared_labels.springs_renumbered,
+    factors.wrong_factor,
+    run_labels.wrong_label,
+    run_labels.wrong_labels,
+    compared_labels.labels_exchanged,
+    statements.equal_statements_differ,
+    statements.wind_exchanged,
+    instruments.coupled_sensor,
+    instruments.drifting_clock,
+    odd_sensors.mirrored_run,
+    statements.wind_not_seen,
+    statements.yaw_moment_too_large,
+    compared_labels.spring_off_the_line,
+    compared_labels.inertia_off_the_springs,
+    statements.inertia_of_no_body,
+    odd_sensors.release_on_the_other_side,
 )
 
 
