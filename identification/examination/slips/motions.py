@@ -122,7 +122,7 @@ class ConditionsFit:
 
     Args:
         number: number of the trial; 0 without a trial.
-        left: residuals of k, a, the springs' stiffness and the springs' damping, shape (2 n + 2 springs,).
+        residuals: residuals of k, a, the springs' stiffness and the springs' damping, shape (2 n + 2 springs,).
         std: standard deviations of the residuals due to noise and the tolerances of the springs.
         chance: standard deviations of the residuals due to the usual scatter between runs.
         freedom: degrees of freedom.

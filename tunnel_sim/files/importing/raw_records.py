@@ -141,7 +141,7 @@ def _records(
     """The cleaned records of the columns of a run: one, or one from each start of the clock.
 
     Args:
-        remarks: remarks on the conditions of the run.
+        said: remarks on the conditions of the run.
     """
     records = []
     kept, remarks = _from_start_to_end(columns.time.values, choices)

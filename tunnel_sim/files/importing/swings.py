@@ -55,7 +55,7 @@ class Swings:
 
     Args:
         at: index of each extreme, shape (m,).
-        left: index of the last sample near the extreme before the swing away from it, shape (m,).
+        departs: index of the last sample near the extreme before the swing away from it, shape (m,).
         reached: index of the first sample near the extreme, shape (m,).
         size: size of the swing from each extreme to the next, in the unit of the reading, shape (m - 1,).
         lasts: time of the swing, shape (m - 1,), s.
