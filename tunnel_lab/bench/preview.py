@@ -15,7 +15,7 @@ from nicegui import ui
 from tunnel_lab.bench.fields import Changed, field_of
 from tunnel_lab.bench.parts import asked_in, label_of, name_of, show_command, text_of
 from tunnel_lab.bench.workspace import Session
-from tunnel_sim.files.importing.choices import ImportChoices, read_recipe, stated_settings
+from tunnel_sim.files.importing.choices import ImportChoices, Stretch, read_recipe, stated_settings
 from tunnel_sim.files.importing.condition_names import SETTABLE
 from tunnel_sim.files.importing.imported_run import LEFT_OUT, ImportedRun
 from tunnel_sim.files.importing.remarks import ImportRemark
@@ -142,10 +142,7 @@ def move(session: Session, mark: Mark, places: Mapping[str, float | None]) -> No
     Raises:
         TunnelError: when the end is not after the start.
     """
-    choices = choices_of(session)
-    now = choices.stretch_of(mark.file, mark.run)
-    others = [one for one in choices.stretches if (one.file, one.run) != (mark.file, mark.run)]
-    stated = now.model_dump() | dict(places)
+    stated = choices_of(session).stretch_of(mark.file, mark.run).model_dump() | dict(places)
     first = mark.start if stated["start"] is None else stated["start"]
     last = mark.end if stated["end"] is None else stated["end"]
     if last <= first:
@@ -154,7 +151,13 @@ def move(session: Session, mark: Mark, places: Mapping[str, float | None]) -> No
             where=f"run '{mark.run}'",
             remedy="move one of them",
         )
-    state(session, {"stretches": [*(one.model_dump() for one in others), stated]})
+    state(session, {"stretches": [*_stretches_beside(session, mark), stated]})
+
+
+def _stretches_beside(session: Session, mark: Mark) -> list[Stretch]:
+    """The statements on other runs."""
+    stretches = choices_of(session).stretches
+    return [one for one in stretches if (one.file, one.run) != (mark.file, mark.run)]
 
 
 def add(session: Session, record: DrawnRecord, at: float) -> str:
@@ -166,22 +169,17 @@ def add(session: Session, record: DrawnRecord, at: float) -> str:
     taken = {mark.run for mark in record.marks}
     names = (f"{record.title}-added-{number}" for number in range(1, len(taken) + 2))
     name = next(name for name in names if name not in taken)
-    stated = [one.model_dump() for one in choices_of(session).stretches]
-    state(
-        session,
-        {"stretches": [*stated, {"file": record.file, "run": name, "start": at, "record": record.title}]},
-    )
+    added = {"file": record.file, "run": name, "start": at, "record": record.title}
+    state(session, {"stretches": [*choices_of(session).stretches, added]})
     return name
 
 
 def remove(session: Session, mark: Mark) -> None:
     """Remove an added run with its release, or leave out a detected run."""
-    choices = choices_of(session)
     if mark.added:
-        kept = [one for one in choices.stretches if (one.file, one.run) != (mark.file, mark.run)]
-        state(session, {"stretches": [one.model_dump() for one in kept]})
+        state(session, {"stretches": _stretches_beside(session, mark)})
     elif not mark.is_left_out:
-        leave_out(session, [*choices.leave_out, mark.run])
+        leave_out(session, [*choices_of(session).leave_out, mark.run])
 
 
 def restore(session: Session, mark: Mark) -> None:

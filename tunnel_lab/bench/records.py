@@ -167,8 +167,8 @@ class RecordsPage:
                 change()
                 await asyncio.to_thread(preview.read, self._session)
             except TunnelError:
-                kept = {"stretches": [one.model_dump() for one in before.stretches]}
-                preview.state(self._session, {**kept, "leave_out": before.leave_out})
+                changed = {"stretches": before.stretches, "leave_out": before.leave_out}
+                preview.state(self._session, changed)
                 raise
             await self._read()
 
