@@ -258,8 +258,8 @@ def drawn(imported: Imported, order: Sequence[str] = ()) -> list[DrawnRecord]:
         time, file, marks = raw.cleaned.file_time_s, raw.source.name, []
         for part in parts:
             start, end = float(time[part.piece.first]), float(time[part.piece.last - 1])
-            judged = part.left_out, doubts[part.id], (file, part.id) in added
-            marks.append(Mark(part.id, file, start, end, *_rest(part, unit), *judged))
+            rest, of_user = _rest(part, unit), (file, part.id) in added
+            marks.append(Mark(part.id, file, start, end, *rest, part.left_out, doubts[part.id], of_user))
         cut = imported.choices.cut and not raw.whole and raw.input is None
         curve = points(time, raw.cleaned.reading)
         records.append(DrawnRecord(raw.id, file, cut, unit, *curve, tuple(marks)))
