@@ -68,42 +68,34 @@ def _away(time: Times, reading: PerSample, first: int, turns: NDArray[np.intp]) 
     a, b = int(turns[0]), int(turns[-1]) + 1
     stride = max(1, (b - a) // _SAMPLES)
     halves_per_s = (turns.size - 1) / float(time[b - 1] - time[a])
-    fitted = _Fit.of(time[a:b:stride] - time[a], reading[a:b:stride], halves_per_s)
-    return None if fitted is None else reading[first:a] - fitted.at(time[first:a] - time[a])
+    decay = _fitted(time[a:b:stride] - time[a], reading[a:b:stride], halves_per_s)
+    if decay is None:
+        return None
+    rates, state = decay
+    return reading[first:a] - np.asarray(_rows(time[first:a] - time[a], rates) @ state)
 
 
-class _Fit:
-    """A free decay about a centre, fitted by least squares."""
-
-    def __init__(self, rates: Array, state: Array) -> None:
-        self.rates, self.state = rates, state
-
-    @classmethod
-    def of(cls, time: Array, values: Array, halves_per_s: float) -> _Fit | None:
-        """The fit; None where it does not converge."""
-        rates = np.array([0.0, np.pi * halves_per_s])  # decay rate and angular frequency
-        for _ in range(_STEPS):
-            rows = _rows(time, rates)
-            if not np.isfinite(rows).all():
-                return None
-            state = np.linalg.lstsq(rows, values, rcond=None)[0]
-            motion = rows[:, 1:] @ state[1:]
-            turned = rows[:, 1] * state[2] - rows[:, 2] * state[1]
-            tangent = np.column_stack([rows, -time * motion, time * turned])
-            step = np.linalg.lstsq(tangent, values - rows @ state, rcond=None)[0][3:]
-            if not np.isfinite(step).all() or np.abs(step).max() > 0.5 * rates[1]:
-                return None
-            rates = rates + step
-            if np.abs(step).max() <= _SETTLED * rates[1]:
-                break
+def _fitted(time: Array, values: Array, halves_per_s: float) -> tuple[Array, Array] | None:
+    """A free decay about a centre, by least squares: its rates and its state; None where it does not converge."""
+    rates = np.array([0.0, np.pi * halves_per_s])  # decay rate and angular frequency
+    for _ in range(_STEPS):
         rows = _rows(time, rates)
         if not np.isfinite(rows).all():
             return None
-        return cls(rates, np.asarray(np.linalg.lstsq(rows, values, rcond=None)[0]))
-
-    def at(self, time: Array) -> Array:
-        """The reading of the decay."""
-        return np.asarray(_rows(time, self.rates) @ self.state)
+        state = np.linalg.lstsq(rows, values, rcond=None)[0]
+        motion = rows[:, 1:] @ state[1:]
+        turned = rows[:, 1] * state[2] - rows[:, 2] * state[1]
+        tangent = np.column_stack([rows, -time * motion, time * turned])
+        step = np.linalg.lstsq(tangent, values - rows @ state, rcond=None)[0][3:]
+        if not np.isfinite(step).all() or np.abs(step).max() > 0.5 * rates[1]:
+            return None
+        rates = rates + step
+        if np.abs(step).max() <= _SETTLED * rates[1]:
+            break
+    rows = _rows(time, rates)
+    if not np.isfinite(rows).all():
+        return None
+    return rates, np.asarray(np.linalg.lstsq(rows, values, rcond=None)[0])
 
 
 def _rows(time: Array, rates: Array) -> Array:
