@@ -5,11 +5,10 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, make_dataclass
-from enum import StrEnum
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 import typer
 from typer import Argument, Option
@@ -230,18 +229,11 @@ def _would_be_written(imported: Imported, out: Path, *, overwrite: bool) -> str:
     return f"Nothing is written. Without --dry-run:\n{listed}\n\n{out / CAMPAIGN_FILE}:\n\n{text.rstrip()}"
 
 
-class ExportFormat(StrEnum):
-    """Format of the file."""
-
-    MAT = "mat"
-    CSV = "csv"
-    XLSX = "xlsx"
-    HDF5 = "hdf5"
-
-
 def export(
     campaign: Annotated[Path, Argument(help="Folder of the campaign: campaign.toml and its runs.")],
-    format: Annotated[ExportFormat, Option("--file-format", help="Format of the file.")],
+    format: Annotated[
+        Literal["mat", "csv", "xlsx", "hdf5"], Option("--file-format", help="Format of the file.")
+    ],
     out: Annotated[
         Path | None,
         Option(
@@ -267,10 +259,10 @@ def export(
     from tunnel_sim.files.exporting import export_campaign
     from tunnel_sim.files.writing import refuse_unwritable
 
-    endings = (".h5", ".hdf5") if format is ExportFormat.HDF5 else (f".{format.value}",)
+    endings = (".h5", ".hdf5") if format == "hdf5" else (f".{format}",)
     path = ending(*endings)(out) or Path(f"{campaign.resolve().name}{endings[0]}")
     refuse_unwritable(path)
     data = read_campaign(campaign)
-    export_campaign(data, path, format.value)
+    export_campaign(data, path, format)
     count = len(data.runs)
     say(f"Written: {path} ({counted(count, 'run')})")

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from enum import StrEnum
 from math import floor, inf, pi, sqrt
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from typer import Argument, Option
 
@@ -29,26 +28,12 @@ if TYPE_CHECKING:
 _COEFFICIENTS = ("cn_beta", "cn_r")
 
 
-class RunFormat(StrEnum):
-    """Format of the runs."""
-
-    PARQUET = "parquet"
-    CSV = "csv"
-
-
-class Goal(StrEnum):
-    """The uncertainty that the input is to minimise."""
-
-    D = "d"
-    CN_R = "cn_r"
-
-
 def simulate(
     plan: Annotated[Path, Argument(help="Plan of the campaign, a TOML file.")],
     out: Annotated[Path, Option("--out", "-o", metavar="FOLDER", help="Where the campaign goes.")],
     format: Annotated[
-        RunFormat, Option("--file-format", help="Format of the run files.")
-    ] = RunFormat.PARQUET,
+        Literal["parquet", "csv"], Option("--file-format", help="Format of the run files.")
+    ] = "parquet",
     seed: Annotated[
         int | None, Option("--seed", min=0, help="Seed of the noise; overrides the plan's.")
     ] = None,
@@ -139,7 +124,7 @@ def simulate(
     with bar("simulating runs", len(loaded.conditions)) as progress:
         campaign = simulate_campaign(loaded, progress=progress)
     folder = write_campaign(
-        campaign, out, run_format=format.value, truth=truth_document(loaded), overwrite=overwrite
+        campaign, out, run_format=format, truth=truth_document(loaded), overwrite=overwrite
     )
     say(f"Written: {folder} ({counted(len(campaign.runs), 'run')})")
     if picture is not None:
@@ -177,8 +162,9 @@ def plan_drive(
     ],
     drive: Annotated[bool, Option("--drive", help="Plan driven runs; the only kind so far.")] = False,
     goal: Annotated[
-        Goal, Option("--goal", help="d: both coefficients, by the determinant; cn_r: Cnr alone.")
-    ] = Goal.D,
+        Literal["d", "cn_r"],
+        Option("--goal", help="d: both coefficients, by the determinant; cn_r: Cnr alone."),
+    ] = "d",
     minutes: Annotated[
         float | None, Option("--minutes", help="Rig time, minutes. Default: as for the free decays.")
     ] = None,
@@ -271,7 +257,7 @@ def plan_drive(
             document,
             rig,
             Limits(moment, amplitude),
-            goal=goal.value,
+            goal=goal,
             duration=duration,
             progress=lambda: progress(next(tried), None),
         )
