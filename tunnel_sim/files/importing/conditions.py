@@ -98,7 +98,7 @@ def find_conditions(
         freedom: freedom of the readings; conditions are stated under its names and in its units.
     """
     claimed = choices.stated_by.model_dump(exclude_none=True)
-    numbers, hints, remarks = _from_facts(table.facts, claimed, where, freedom)
+    numbers, hints, remarks = _from_facts(table, claimed, where, freedom)
     columns: dict[str, Channel] = {}
     like = []
     for channel in table.channels:
@@ -121,24 +121,7 @@ def find_conditions(
             what = f"no column or number '{one_line(text, 40)}' that states {key}"
             raise TunnelError(what, where=where, remedy=f"--set {key}: {did_you_mean(text, known)}")
     hints += [hint for name, text in table.texts.items() if (hint := _hint_of_text(name, text)) is not None]
-    remarks += _unused_statements(table, claimed, freedom)
     return Stated(numbers, columns, hints=tuple(hints), like=tuple(like)), remarks
-
-
-def _unused_statements(table: Table, claimed: Mapping[str, str], freedom: Freedom) -> list[str]:
-    """A remark on the numbers and texts of a table that are neither used nor reported elsewhere."""
-    found = []
-    for heading, value in table.facts.items():
-        name, unit, _ = freedom.condition(*split_unit(heading))
-        used = condition_of(name, unit, alone=True) is not None or any(
-            claims(text, name, unit) for text in claimed.values()
-        )
-        if not (used or heading in INPUT_FACTS or describes_samples(heading) or resembles(name, unit)):
-            number = f"{value:g}" if np.isfinite(value) else "several numbers"
-            found.append(f"{one_line(heading, 40)} = {number}")
-    found += [f"{one_line(name, 40)}: '{one_line(text, 60)}'" for name, text in table.texts.items()]
-    more = f" and {len(found) - _LISTED} more" if len(found) > _LISTED else ""
-    return [f"stated in the file and not used: {', '.join(found[:_LISTED])}{more}"] if found else []
 
 
 def _hint_of_text(name: str, text: str) -> Hint | None:
@@ -158,9 +141,11 @@ def _hint_of_text(name: str, text: str) -> Hint | None:
 
 
 def _from_facts(
-    facts: Mapping[str, float], claimed: Mapping[str, str], where: str, freedom: Freedom
+    table: Table, claimed: Mapping[str, str], where: str, freedom: Freedom
 ) -> tuple[dict[str, float], list[Hint], list[str]]:
-    """Conditions and sizes stated by numbers of a file, by key, in the units of `Conditions`; hints; remarks.
+    """Conditions and sizes stated by the numbers of a table, by key, in the units of `Conditions`; hints; remarks.
+
+    The last remark lists the numbers and texts that are neither used nor hints.
 
     Args:
         claimed: by key, the names of numbers that, according to the user, state a condition.
@@ -169,7 +154,8 @@ def _from_facts(
     names: dict[str, str] = {}
     contested: dict[str, Hint] = {}
     hints = []
-    for heading, value in facts.items():
+    unused = []
+    for heading, value in table.facts.items():
         name, unit = split_unit(heading)
         key = next((key for key, text in claimed.items() if claims(text, name, unit)), None)
         sure = key is not None
@@ -190,6 +176,9 @@ def _from_facts(
             raise asking(f"--set {key}=NUMBER", what, where)
         elif hint := _hint(name, unit, key, float(value)):
             hints.append(hint)
+        elif heading not in INPUT_FACTS and not describes_samples(heading):
+            number = f"{value:g}" if np.isfinite(value) else "several numbers"
+            unused.append(f"{one_line(heading, 40)} = {number}")
     for key in [key for key in contested if names[key] not in claimed.values()]:
         hints.append(contested[key])
         del conditions[key], names[key]
@@ -199,8 +188,14 @@ def _from_facts(
         conditions["wind_speed"], names["wind_speed"] = symbols[0].value, f"{symbols[0].what}, in m/s"
         hints.remove(symbols[0])
     named = {key: "" if names[key] == key else f" ({names[key]})" for key in conditions}
-    remarks = [stated_remark(key, value, f"the file{named[key]}") for key, value in conditions.items()]
-    return conditions, hints, [*remarks]
+    remarks: list[str] = [
+        stated_remark(key, value, f"the file{named[key]}") for key, value in conditions.items()
+    ]
+    unused += [f"{one_line(name, 40)}: '{one_line(text, 60)}'" for name, text in table.texts.items()]
+    more = f" and {len(unused) - _LISTED} more" if len(unused) > _LISTED else ""
+    if unused:
+        remarks.append(f"stated in the file and not used: {', '.join(unused[:_LISTED])}{more}")
+    return conditions, hints, remarks
 
 
 def stated_remark(key: str, value: float, place: str) -> ImportRemark:
