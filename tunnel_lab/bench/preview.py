@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +12,7 @@ import tomli_w
 from nicegui import ui
 
 from tunnel_lab.bench.fields import Changed, field_of
-from tunnel_lab.bench.parts import asked_in, label_of, name_of, show_command, text_of
+from tunnel_lab.bench.parts import asked_in, label_of, name_of, text_of
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.files.importing.choices import ImportChoices, Stretch, read_recipe, stated_settings
 from tunnel_sim.files.importing.condition_names import SETTABLE
@@ -336,17 +335,6 @@ def show_choices(session: Session, keys: Sequence[str], columns: list[str], chan
                     "dense bottom-slots"
                 )
                 field.props["hint"] = "such as wind_speed=0, air_density=1.2"
-                field.on("change", partial(_set_conditions, changed, field))
+                field.on("change", lambda field=field: changed("conditions", field.value))
             else:
                 field_of(ImportChoices, key, getattr(now, key), changed, options.get(key))
-
-
-async def _set_conditions(changed: Changed, field: ui.input) -> None:
-    await changed("conditions", field.value)
-
-
-def show_import_command(session: Session) -> None:
-    """The command that repeats the import."""
-    show_command(
-        f"tunnel import {session.uploads}/* --recipe {session.choices} --out {session.campaign} --yes"
-    )

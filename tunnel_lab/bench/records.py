@@ -18,9 +18,10 @@ from tunnel_lab.bench.parts import (
     button,
     page_words,
     show_blocks,
+    show_command,
     show_items,
 )
-from tunnel_lab.bench.uploads import drop_zone, more
+from tunnel_lab.bench.uploads import drop_zone
 from tunnel_lab.bench.workspace import Session, rename
 from tunnel_sim.vocabulary.errors import TunnelError, counted
 
@@ -116,7 +117,8 @@ class RecordsPage:
         with self._corrections:
             others = [key for key in preview.CORRECTIONS if key not in keys]
             preview.show_choices(self._session, others, self._names, self._changed)
-            preview.show_import_command(self._session)
+            repeated = f"--recipe {self._session.choices} --out {self._session.campaign} --yes"
+            show_command(f"tunnel import {self._session.uploads}/* {repeated}")
 
     def _rename(self, name: str) -> None:
         with self._fault.around():
@@ -261,7 +263,7 @@ class RecordsPage:
                     self._show_files()
                     await self._read()
 
-                drop_zone(more(self._session), kept, Fault())
+                drop_zone(address(self._session, "upload"), kept, Fault())
 
     def _draw(self, imported: Imported) -> None:
         """Draw the records, or only their marks if the records are already drawn."""

@@ -30,11 +30,6 @@ _MOST_FILES = 1000  # maximum number of files in a request
 _one_at_a_time = Lock()  # two requests must not take the same new name
 
 
-def more(session: Session) -> str:
-    """Address for further files of a session."""
-    return address(session, "upload")
-
-
 def too_large(size: int) -> str:
     """The reason for refusing an upload of ``size`` bytes."""
     most = f"{UPLOAD_BYTES / 1e6:.0f} MB of an upload"
