@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from math import pi
 
 from identification.examination.self_excited import Swing
 from identification.status import Remark
@@ -28,6 +29,15 @@ class SlipEvidence:
     stated: Campaign
     swings: tuple[Swing, ...]
 
+
+STIFFNESS_UNITS: Mapping[str, float] = {
+    "N mm/rad": 1e3,
+    "N cm/rad": 1e2,
+    "N m/deg": pi / 180.0,
+    "kgf m/rad": 1.0 / 9.80665,
+    "lbf in/rad": 8.8507,
+}
+"""A stiffness in units that are taken for N m/rad, over the stiffness in N m/rad."""
 
 StatementSlip = Callable[[SlipEvidence], tuple[Remark, ...]]
 """A contradicted statement: from the evidence to a remark for each, none if all statements may be right."""

@@ -20,7 +20,7 @@ from scipy.special import chdtri, fdtri, ndtri
 
 from identification import policy
 from identification.examination.self_excited import Swing
-from identification.examination.slips.base import SlipEvidence
+from identification.examination.slips.base import STIFFNESS_UNITS, SlipEvidence
 from identification.status import WITHHOLDS, Outcome, Remark
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.vocabulary.record import Array
@@ -215,11 +215,7 @@ _LEAST = 3  # minimum number of springs for identifying the wrong one
 
 #: Ratios of Kr/ωn² to the stated inertia for a value in another unit.
 _SLIPS = {
-    1e3: "spring_stiffness in N mm/rad",
-    1e2: "spring_stiffness in N cm/rad",
-    np.pi / 180.0: "spring_stiffness in N m/deg",
-    1.0 / 9.81: "spring_stiffness in kgf m/rad",
-    8.85: "spring_stiffness in lbf in/rad",
+    **{factor: f"spring_stiffness in {unit}" for unit, factor in STIFFNESS_UNITS.items()},
     1e6: "time_s in milliseconds",
     1.0 / 3600.0: "time_s in minutes",
     1e-3: "yaw_inertia in g m2",

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from identification import policy
-from identification.examination.slips.base import SlipEvidence
+from identification.examination.slips.base import STIFFNESS_UNITS, SlipEvidence
 from identification.examination.slips.fits import Statements, agreement
 from identification.status import Outcome, Remark
 
@@ -87,13 +87,7 @@ def _without_wind(value: float, _others: Sequence[float]) -> Iterator[tuple[floa
 
 
 _SPEEDS = {"in km/h": 3.6, "in knots": 1.9438, "in mph": 2.2369, "in ft/s": 3.2808}
-_STIFFNESSES = {
-    "in N mm/rad": 1e3,
-    "in N cm/rad": 1e2,
-    "in N m/deg": 1.0 / 57.2958,
-    "in kgf m/rad": 1.0 / 9.80665,
-    "in lbf in/rad": 8.8507,
-}
+_STIFFNESSES = {f"in {unit}": factor for unit, factor in STIFFNESS_UNITS.items()}
 #: The stamped times over the true ones.
 _CLOCKS = {
     "in minutes": 60.0,

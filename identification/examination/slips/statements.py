@@ -10,7 +10,7 @@ from scipy.special import chdtri
 
 from identification import policy
 from identification.examination.self_excited import Swing
-from identification.examination.slips.base import SlipEvidence
+from identification.examination.slips.base import STIFFNESS_UNITS, SlipEvidence
 from identification.examination.slips.fits import Statements, agreement
 from identification.status import WITHHOLDS, Outcome, Remark
 from tunnel_sim.vocabulary.campaign import speed_groups
@@ -184,9 +184,7 @@ _SLENDER = 12.0  # Izz of a uniform rod of mass m and length l is m l²/12
 
 #: Ratios of apparent to true density for a value in another unit.
 _OF_DENSITY = {
-    "spring_stiffness in N mm/rad": 1e3,
-    "spring_stiffness in N cm/rad": 1e2,
-    "spring_stiffness in N m/deg": np.pi / 180.0,
+    **{f"spring_stiffness in {unit}": STIFFNESS_UNITS[unit] for unit in ("N mm/rad", "N cm/rad", "N m/deg")},
     "time_s in minutes": 1.0 / 3600.0,
     "time_s in milliseconds": 1e6,
     "frontal_area in cm2": 1e-4,
