@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from tunnel_sim.files.importing.condition_names import condition_of
+from tunnel_sim.files.importing.condition_names import JOINED, condition_of
 from tunnel_sim.files.importing.tables import Channel
 from tunnel_sim.files.importing.units import claims, kind_of
 
@@ -29,8 +29,6 @@ _RATE = re.compile(
 _ACCELERATION = re.compile(
     r"acceleration|beschleunigung|ddot|[βθψφ]̈|(?<![a-z])(angacc|acc|acce?l)(?![a-z])", re.IGNORECASE
 )
-_JOINED = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
-"""Word boundaries in a name that joins words, such as ``xGyro`` or ``ZGyro``."""
 OTHER = re.compile(
     r"(?<![a-z])(index|idx|sample|samples|nr|no|row|#|frame|temperature|current|force)(?![a-z])", re.I
 )
@@ -38,7 +36,7 @@ OTHER = re.compile(
 
 def named_kind(name: str) -> str:
     """The kind of quantity, ``rate`` or ``acceleration``, stated by a column's name; empty: neither."""
-    words = _JOINED.sub("_", name)
+    words = JOINED.sub("_", name)
     if _ACCELERATION.search(words):
         return "acceleration"
     return "rate" if _RATE.search(words) else ""
@@ -51,7 +49,7 @@ _VOLTAGE = re.compile(
 
 def names_voltage(name: str) -> bool:
     """Whether a name denotes a voltage, or a channel of a converter or an oscilloscope."""
-    return _VOLTAGE.fullmatch(_JOINED.sub("_", name)) is not None
+    return _VOLTAGE.fullmatch(JOINED.sub("_", name)) is not None
 
 
 def stem(name: str) -> str:

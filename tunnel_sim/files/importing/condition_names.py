@@ -85,7 +85,8 @@ _NOT_WINDY = re.compile(
     r"dichte|date|time|name|number|nummer|version|serial|fps|sample|cpu|baud|sound|light|step|index|count|code"
 )
 _FAN = re.compile(r"(?i)(?<![a-z])(fan|blower|gebl[äa]se|tunnel|wind|windkanal)(?![a-z])")
-_JOINED = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
+JOINED = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
+"""Word boundaries in a name that joins words, such as ``xGyro`` or ``ZGyro``."""
 _DYNAMIC = re.compile(
     r"(?i)dynamic[ _]?press|staudruck|pitot|prandtl|(?<![a-z])(q[ _]?inf|dp|delta[ _]?p)(?![a-z])"
 )
@@ -135,7 +136,7 @@ def condition_of(name: str, unit: str, *, alone: bool = False) -> str | None:
 
 def resembles(name: str, unit: str) -> str | None:
     """The condition that a name without a unit, or a unit alone, suggests without stating it; None: none."""
-    words = _JOINED.sub("_", name.strip())
+    words = JOINED.sub("_", name.strip())
     pressed = _DYNAMIC.search(words) or (unit and re.fullmatch(r"(?i)q(\s*\W.*)?", words))
     if pressed and unit.lower() in _PRESSURES:
         return "wind_speed"
