@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from tunnel_sim.files.importing.condition_names import RUN_KEYS, Hint
+from tunnel_sim.files.importing.units import UNITS
 from tunnel_sim.files.reading import PACKED, stem_of
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, shown
 
@@ -61,8 +62,10 @@ _LABELS = {
 }
 _LABEL = "|".join(_LABELS.values())
 _AFTER = {  # units after a number in a file's name, and the factor to SI; "ms" is as often a time
-    "wind_speed": {"m_s": 1.0, "m-s": 1.0, "mps": 1.0, "kmh": 1 / 3.6, "km_h": 1 / 3.6, "kph": 1 / 3.6}
-    | {"mph": 0.44704, "kn": 0.514444, "kts": 0.514444, "fps": 0.3048},
+    "wind_speed": dict.fromkeys(("m_s", "m-s", "mps"), 1.0)
+    | dict.fromkeys(("kmh", "km_h", "kph"), UNITS["speed"]["km/h"])
+    | dict.fromkeys(("kn", "kts"), UNITS["speed"]["kn"])
+    | {"mph": UNITS["speed"]["mph"], "fps": UNITS["speed"]["ft/s"]},
     "release_angle": {"deg": np.pi / 180.0, "grad": np.pi / 180.0, "°": np.pi / 180.0},
     "spring_stiffness": {"nm_rad": 1.0, "nmrad": 1.0},
 }

@@ -468,3 +468,11 @@ def test_a_stiffness_in_an_unknown_unit_is_said(heading: str, tmp_path: Path) ->
 def test_a_wind_under_other_names_is_not_wind_off(heading: str, tmp_path: Path) -> None:
     with pytest.raises(TunnelError, match="wind-off is not assumed beside it"):
         read_records([with_column(tmp_path, heading, 60.0)])
+
+
+def test_a_speed_in_knots_in_a_file_name_has_the_digits_of_a_stated_one(tmp_path: Path) -> None:
+    path = with_head(tmp_path, "").rename(tmp_path / "decay_15kn.csv")
+    with pytest.raises(Unstated) as caught:
+        read_records([path])
+    stated, _ = parse_setting("wind_speed=15 kn", "--set")
+    assert f"--set wind_speed={stated.wind_speed:g}" in caught.value.options
