@@ -7,14 +7,10 @@ from collections.abc import Sequence
 
 from tunnel_sim.files.importing.condition_names import JOINED, condition_of
 from tunnel_sim.files.importing.tables import Channel
-from tunnel_sim.files.importing.units import claims, kind_of
+from tunnel_sim.files.importing.units import claims, kind_of, names_a_time
 
 RUN_MARK = re.compile(
     r"[\s_,;.#(\[-]*(?:run|trial|test|swing|rep|versuch|messung|lauf)[\s_#.-]*(\d+)[)\]]?\s*$", re.IGNORECASE
-)
-_TIME = re.compile(
-    r"(?<![a-z])(t|time|timed|times|timestamp|zeit|temps|tiempo|tempo|tijd|tid|elapsed|uhrzeit|x_value)(?![a-z])",
-    re.IGNORECASE,
 )
 ANGLE = re.compile(
     r"angle|winkel|angolo|yaw|(?<![a-z])(theta|beta|psi|phi|alpha|pitch|roll|pos|position|encoder|rotation|deg|rad)"
@@ -62,7 +58,7 @@ def is_time(channel: Channel) -> bool:
     kind = kind_of(channel.unit)
     if condition_of(channel.name, channel.unit) is not None:
         return False
-    return kind == "time" or (kind == "" and _TIME.search(channel.name) is not None)
+    return kind == "time" or (kind == "" and names_a_time(channel.name))
 
 
 def named(channels: Sequence[Channel], wanted: str) -> list[Channel]:

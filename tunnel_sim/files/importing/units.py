@@ -71,7 +71,7 @@ _PER_TIME = ("s", "sec", "min", "h")
 _AMBIGUOUS = ("min", "h")
 """After a blank or an underscore also a minimum or a height: only for times are they units there."""
 _TIMES = re.compile(
-    r"(?i)(?<![a-z])(t|time|timed|times|timestamp|zeit|temps|tiempo|tempo|elapsed|uhrzeit)(?![a-z])"
+    r"(?i)(?<![a-z])(t|time|timed|times|timestamp|zeit|temps|tiempo|tempo|tijd|tid|elapsed|uhrzeit|x_value)(?![a-z])"
 )
 _RUN = r"(?:run|trial|test|swing|rep|versuch|messung|lauf)"
 _OF_RUN = re.compile(rf"(?i)[\s_]+{_RUN}[\s_#.-]*\d+\s*$")

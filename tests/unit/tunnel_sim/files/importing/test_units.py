@@ -29,6 +29,7 @@ HEADINGS = {
     "Zeit in min": ("Zeit", "min"),
     "time in min": ("time", "min"),
     "elapsed time s": ("elapsed time", "s"),
+    "tijd min": ("tijd", "min"),
     "Zeit in Sekunden seit Start": ("Zeit", "s"),
     "Drehwinkel (Grad)": ("Drehwinkel", "deg"),
     "Winkel [grad]": ("Winkel", "deg"),
