@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -98,7 +98,7 @@ class NamePart:
     end: int
     before: str
     behind: str
-    written: bool = field(default=True)
+    written: bool
 
     @property
     def text(self) -> str:
