@@ -7,8 +7,8 @@ from collections.abc import Callable
 from nicegui import ui
 
 from diagnosis.result import Diagnosis
-from tunnel_lab.bench.workspace import CAMPAIGN_FILE, Session
-from tunnel_sim.files.campaign_folder import read_document
+from tunnel_lab.bench.workspace import Session
+from tunnel_sim.files.campaign_folder import CAMPAIGN_FILE, read_document
 from tunnel_sim.files.reading import read_json
 from tunnel_sim.files.writing import write_json
 

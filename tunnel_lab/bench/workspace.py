@@ -13,10 +13,9 @@ from typing import Any
 
 from diagnosis.result import Diagnosis
 from tunnel_lab.bench.work import work_of
-from tunnel_sim.files.reading import stem_of
+from tunnel_sim.files.reading import CAMPAIGN_FILE, stem_of
 from tunnel_sim.vocabulary.errors import TunnelError, one_line
 
-CAMPAIGN_FILE = "campaign.toml"  # as in campaign_schema, which is slow to load
 _LONGEST = 80  # maximum number of characters of a file name
 _LEAST_NAME = 3  # minimum number of characters of a name that files share
 _RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\.|$)", re.IGNORECASE)  # names of devices in Windows

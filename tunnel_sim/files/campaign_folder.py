@@ -13,6 +13,7 @@ import tomli_w
 from pydantic import Field
 
 from tunnel_sim.files.plausible import checked_record, plausible_values
+from tunnel_sim.files.reading import CAMPAIGN_FILE as CAMPAIGN_FILE
 from tunnel_sim.files.reading import check_count, nearest, nearest_campaign
 from tunnel_sim.files.run_files import RUN_FORMATS, read_table, table_bytes
 from tunnel_sim.files.scatter_tables import RepeatabilityTable
@@ -44,7 +45,6 @@ from tunnel_sim.vocabulary.freedom import ANGLE, FREEDOMS, Freedom, Motion
 from tunnel_sim.vocabulary.input_kinds import INPUTS, InputColumn
 from tunnel_sim.vocabulary.inputs import INPUT_KEYS, Hold, Input, without_spring_needs_input
 
-CAMPAIGN_FILE = "campaign.toml"
 NO_CAMPAIGN = f"name a folder that holds a {CAMPAIGN_FILE}"
 
 

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     import polars as pl
 
 _MOST_NAMES = 1000  # number of files of a folder that are compared
-_MARKER = "campaign.toml"
+CAMPAIGN_FILE = "campaign.toml"
+"""The file that makes a folder a campaign."""
 
 
 def nearest(path: Path) -> str:
@@ -38,15 +39,17 @@ def nearest(path: Path) -> str:
 
 def nearest_campaign(folder: Path) -> str:
     """The campaign around or inside a folder that is not one, as a question; empty if there is none."""
-    around = [folder.parent] if (folder.parent / _MARKER).is_file() else []
-    inside = [folder / entry.name for entry in _entries(folder) if (folder / entry.name / _MARKER).is_file()]
+    around = [folder.parent] if (folder.parent / CAMPAIGN_FILE).is_file() else []
+    inside = [
+        folder / entry.name for entry in _entries(folder) if (folder / entry.name / CAMPAIGN_FILE).is_file()
+    ]
     found = around or inside
     return _question(found[0]) if len(found) == 1 else ""
 
 
 def inside(folder: Path) -> str:
     """The remedy if a folder is given instead of a file: its kind, or a file in it; empty if there is none."""
-    if (folder / _MARKER).is_file():
+    if (folder / CAMPAIGN_FILE).is_file():
         return "it is a campaign, which tunnel identify and tunnel diagnose take"
     files = sorted(entry.name for entry in _entries(folder) if (folder / entry.name).is_file())
     return f"name a file in it, such as '{shown(folder / files[0])}'" if files else ""

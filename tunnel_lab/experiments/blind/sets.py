@@ -21,7 +21,7 @@ from tunnel_reference.in_phase import in_phase
 from tunnel_reference.make import as_campaign, draw_set, simulate_set, truth_of
 from tunnel_reference.scatter_draws import MIXED
 from tunnel_reference.severity import ATTEMPTS, Simulated
-from tunnel_sim.files.campaign_folder import write_campaign
+from tunnel_sim.files.campaign_folder import CAMPAIGN_FILE, write_campaign
 from tunnel_sim.files.reading import read_json, read_regular
 from tunnel_sim.files.writing import clear_leftovers, json_text, whole_folder, write_whole
 from tunnel_sim.vocabulary import limits
@@ -30,7 +30,6 @@ from tunnel_sim.vocabulary.errors import TunnelError, shown
 SCHEMA_VERSION = 1
 SEAL = "seal.json"
 KEY = "key.json"
-_CAMPAIGN = "campaign.toml"
 
 
 @dataclass(frozen=True)
@@ -107,7 +106,7 @@ def campaign_folders(folder: Path) -> list[Path]:
     Raises:
         TunnelError: when there are none.
     """
-    found = sorted(path.parent for path in folder.glob(f"*/{_CAMPAIGN}"))
+    found = sorted(path.parent for path in folder.glob(f"*/{CAMPAIGN_FILE}"))
     if not found:
         raise TunnelError(
             "does not contain a campaign",

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tunnel_lab.bench.workspace import CAMPAIGN_FILE, new_session, open_session, safe_name, sessions
+from tunnel_lab.bench.workspace import new_session, open_session, safe_name, sessions
+from tunnel_sim.files.reading import CAMPAIGN_FILE
 from tunnel_sim.files import campaign_folder
 from tunnel_sim.vocabulary.errors import TunnelError
 
