@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from tunnel_lab.bench.workspace import new_session, open_session, safe_name, sessions
 from tunnel_sim.files.reading import CAMPAIGN_FILE
-from tunnel_sim.files import campaign_folder
 from tunnel_sim.vocabulary.errors import TunnelError
 
 HOSTILE = {
@@ -63,7 +62,3 @@ def test_an_address_names_a_session_or_is_refused(tmp_path: Path, name: str) -> 
     (tmp_path / "other").mkdir()
     with pytest.raises(TunnelError, match="there is no campaign"):
         open_session(tmp_path, name)
-
-
-def test_the_campaign_file_is_that_of_the_format() -> None:
-    assert CAMPAIGN_FILE == campaign_folder.CAMPAIGN_FILE
