@@ -177,8 +177,8 @@ def _from_facts(
         elif hint := _hint(name, unit, key, float(value)):
             hints.append(hint)
         elif heading not in INPUT_FACTS and not describes_samples(heading):
-            number = f"{value:g}" if np.isfinite(value) else "several numbers"
-            unused.append(f"{one_line(heading, 40)} = {number}")
+            stated = f"{value:g}" if np.isfinite(value) else "several numbers"
+            unused.append(f"{one_line(heading, 40)} = {stated}")
     for key in [key for key in contested if names[key] not in claimed.values()]:
         hints.append(contested[key])
         del conditions[key], names[key]
