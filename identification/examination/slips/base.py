@@ -39,5 +39,5 @@ STIFFNESS_UNITS: Mapping[str, float] = {
 }
 """A stiffness in units that are taken for N m/rad, over the stiffness in N m/rad."""
 
-StatementSlip = Callable[[SlipEvidence], tuple[Remark, ...]]
-"""A contradicted statement: from the evidence to a remark for each, none if all statements may be right."""
+StatementSlip = Callable[[SlipEvidence], Remark | None]
+"""A contradicted statement: from the evidence to a remark, None if all statements may be right."""

@@ -73,11 +73,11 @@ class _Misfit:
         return self.squares <= float(chdtri(self.freedom, policy.MISFIT_RATE))
 
 
-def labels_exchanged(evidence: SlipEvidence) -> tuple[Remark, ...]:
+def labels_exchanged(evidence: SlipEvidence) -> Remark | None:
     """Springs or wind speeds of two runs, or of all runs of two settings, are exchanged. Refused."""
     known = [swing for swing in evidence.swings if swing.run.spring_stiffness is not None]
     if len(known) < _LEAST_RUNS:
-        return ()
+        return None
     labels = Labels.of(known)
     for what in (_SPRINGS, "wind_speed"):
         stated, away = _misfit(labels, what)
@@ -99,8 +99,8 @@ def labels_exchanged(evidence: SlipEvidence) -> tuple[Remark, ...]:
         ids = tuple(dict.fromkeys(itertools.chain.from_iterable(names)))
         pairs = ", or ".join(" and ".join(pair) for pair in names)
         said = f"the stated {what} contradicts the frequencies, but agrees if {pairs} are exchanged"
-        return (Remark(Outcome.REFUSED, ids, said, f"correct {what} or the file names of these runs"),)
-    return ()
+        return Remark(Outcome.REFUSED, ids, said, f"correct {what} or the file names of these runs")
+    return None
 
 
 def _other_fits(swings: Sequence[Swing]) -> list[tuple[float, float | None]]:
@@ -268,14 +268,14 @@ class _Springs:
         return float(away @ away) > float(chdtri(self.stiffness.size - 1, policy.MISFIT_RATE))
 
 
-def springs_renumbered(evidence: SlipEvidence) -> tuple[Remark, ...]:
+def springs_renumbered(evidence: SlipEvidence) -> Remark | None:
     """All springs are one number off, in the campaign's own order or in the packaged list. Refused."""
     if evidence.campaign.sensor.plausible is False:
-        return ()
+        return None
     still = [s for s in evidence.swings if not s.run.wind_on and s.run.spring_stiffness is not None]
     stated = _Springs.of(still)
     if stated.stiffness.size < 2 or np.ptp(stated.inertia) < np.log1p(policy.OTHER_NUMBER):
-        return ()
+        return None
     own = sorted({float(s.run.spring_stiffness or 0.0) for s in evidence.swings})
     for table in (np.array(list(load_rig().springs.values())), np.array(own)):
         places = [
@@ -294,8 +294,8 @@ def springs_renumbered(evidence: SlipEvidence) -> tuple[Remark, ...]:
             std = np.hypot(stated.std[inside], policy.SPRING_AT_BEST)
             away = inertia - np.average(inertia, weights=std**-2)
             if float(np.sum((away / std) ** 2)) <= float(chdtri(known - 1, policy.SLIP_AGREES)):
-                return (_renumbered(stated, inside, meant, shift),)
-    return ()
+                return _renumbered(stated, inside, meant, shift)
+    return None
 
 
 def _renumbered(stated: _Springs, inside: NDArray[np.bool_], meant: Array, shift: int) -> Remark:
@@ -314,14 +314,14 @@ def _renumbered(stated: _Springs, inside: NDArray[np.bool_], meant: Array, shift
     return Remark(Outcome.REFUSED, tuple(name for group in stated.runs for name in group), what, remedy)
 
 
-def spring_off_the_line(evidence: SlipEvidence) -> tuple[Remark, ...]:
+def spring_off_the_line(evidence: SlipEvidence) -> Remark | None:
     """A spring that is not as stiff as stated, according to the others. Noted."""
     still = [s for s in evidence.swings if not s.run.wind_on and s.run.spring_stiffness is not None]
     if len({s.run.spring_stiffness for s in still}) < 2:
-        return ()
+        return None
     springs = _Springs.of(still)
     if not springs.disagree():
-        return ()
+        return None
     fits = _other_fits(evidence.swings)
     figures = {"inertias_kg_m2": [one for one, _ in fits], "air_stiffnesses_m3": [air for _, air in fits]}
     # the spring that differs beyond chance while the others agree
@@ -342,7 +342,7 @@ def spring_off_the_line(evidence: SlipEvidence) -> tuple[Remark, ...]:
         remedy = (
             "calibrate that spring again; a tilted axis or a flexible rod looks similar, run the diagnosis"
         )
-        return (Remark(Outcome.NOTED, springs.runs[place], what, remedy, figures),)
+        return Remark(Outcome.NOTED, springs.runs[place], what, remedy, figures)
     spread = 100.0 * np.expm1(float(np.ptp(springs.inertia)))
     ids = tuple(name for group in springs.runs for name in group)
     what = (
@@ -350,10 +350,10 @@ def spring_off_the_line(evidence: SlipEvidence) -> tuple[Remark, ...]:
         "wrong cannot be determined"
     )
     remedy = "calibrate the springs again; a tilted axis or a flexible rod looks similar, run the diagnosis"
-    return (Remark(Outcome.NOTED, ids, what, remedy, figures),)
+    return Remark(Outcome.NOTED, ids, what, remedy, figures)
 
 
-def inertia_off_the_springs(evidence: SlipEvidence) -> tuple[Remark, ...]:
+def inertia_off_the_springs(evidence: SlipEvidence) -> Remark | None:
     """A stated inertia that the springs contradict. Noted.
 
     A nominal inertia may be slightly wrong. The remark names the probable error of units; there is none where the
@@ -363,11 +363,11 @@ def inertia_off_the_springs(evidence: SlipEvidence) -> tuple[Remark, ...]:
     still = [s for s in evidence.swings if not s.run.wind_on and s.run.spring_stiffness is not None]
     stated = campaign.rig.yaw_inertia
     if stated is None or not still or campaign.sensor.plausible is False:
-        return ()
+        return None
     found = float(np.exp(_Springs.of(still).mean()[0]))
     off = {ratio: abs(np.log(found / stated / ratio)) for ratio in (1.0, *_SLIPS)}
     if off[1.0] <= np.log(policy.INERTIA_FACTOR):
-        return ()
+        return None
     nearest = min(_SLIPS, key=off.__getitem__)
     slip = f": it looks like {_SLIPS[nearest]}" if off[nearest] <= np.log(policy.INERTIA_FACTOR) else ""
     what = (
@@ -378,4 +378,4 @@ def inertia_off_the_springs(evidence: SlipEvidence) -> tuple[Remark, ...]:
     figures: dict[str, Any] = {"inertias_kg_m2": [stated], "air_stiffnesses_m3": [None]}
     if abs(np.log(found / stated)) > np.log(policy.WITHHELD_INERTIA):
         figures[WITHHOLDS] = True
-    return (Remark(Outcome.NOTED, tuple(s.run.id for s in still), what, remedy, figures),)
+    return Remark(Outcome.NOTED, tuple(s.run.id for s in still), what, remedy, figures)

@@ -42,7 +42,7 @@ _ROUNDED = "spring_stiffness, rounded"
 _KINDS = {"speed": "wind_speed", "density": "air_density", "clock": "time_s", "spring": "spring_stiffness"}
 
 
-def wrong_factor(evidence: SlipEvidence) -> tuple[Remark, ...]:
+def wrong_factor(evidence: SlipEvidence) -> Remark | None:
     """One factor on a speed, a density, a spring or a clock makes all runs agree, and no effect does.
 
     Refused, or asked about where the evidence is weaker.
@@ -51,12 +51,12 @@ def wrong_factor(evidence: SlipEvidence) -> tuple[Remark, ...]:
     """
     swings = [s for s in evidence.swings if s.run.spring_stiffness and s.rate > 0.0 and s.stiffness > 0.0]
     if len(swings) < _FEWEST:
-        return ()
+        return None
     motions = MeasuredMotions.of(swings)
     found = _agreeing(motions)
     best = min(found, key=lambda one: one.fit.squares(one.level), default=None)
     if best is None or _labels_agree(evidence, motions, best):
-        return ()
+        return None
     return _said(motions, found)
 
 
@@ -241,7 +241,7 @@ def _effects(m: MeasuredMotions) -> Iterator[TrialSlip]:
         yield TrialSlip(lambda c, e: replace(c, lag=e * phase), places, start=start)
 
 
-def _said(m: MeasuredMotions, found: Sequence[_Found]) -> tuple[Remark, ...]:
+def _said(m: MeasuredMotions, found: Sequence[_Found]) -> Remark | None:
     """The remark on the best slips."""
     best: dict[tuple[Places, str], _Found] = {}
     for one in found:
@@ -255,7 +255,7 @@ def _said(m: MeasuredMotions, found: Sequence[_Found]) -> tuple[Remark, ...]:
     remedy = f"correct {' or '.join(keys)}, or leave {'the run' if len(ids) == 1 else 'these runs'} out"
     outcome = Outcome.REFUSED if found[0].refused else Outcome.NOTED
     figures: dict[str, Any] = {SYSTEMATIC: said}
-    return (Remark(outcome, ids, what, remedy, figures),)
+    return Remark(outcome, ids, what, remedy, figures)
 
 
 def _words(m: MeasuredMotions, trial: TrialSlip, number: float) -> str:

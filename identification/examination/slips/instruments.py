@@ -41,7 +41,7 @@ class _Phase:
     free: Array
 
 
-def drifting_clock(evidence: SlipEvidence) -> tuple[Remark, ...]:
+def drifting_clock(evidence: SlipEvidence) -> Remark | None:
     """All runs, or a single one, change their frequency linearly with time, not with the amplitude. Refused.
 
     An effect changes the frequency with the amplitude, which falls faster in runs of greater damping. The phase
@@ -54,7 +54,7 @@ def drifting_clock(evidence: SlipEvidence) -> tuple[Remark, ...]:
     still = {swing.run.id for swing in evidence.swings if not swing.run.wind_on}
     # one decay does not separate time from amplitude, and without wind-off runs the wind speed may drift
     if len(phases) < 2 or not any(phase.run in still for phase in phases):
-        return ()
+        return None
     whole = tuple(range(len(phases)))
     for places in (whole, *((place,) for place in whole if len(phases) > 2)):
         drift, std, squares, freedom = _fitted_drift(phases, places, by_amplitude=False)
@@ -75,8 +75,8 @@ def drifting_clock(evidence: SlipEvidence) -> tuple[Remark, ...]:
             f"the clock of the logger drifts, or the stiffness of a spring that warms up{air}"
         )
         remedy = "correct time_s by a reference, let the spring settle, or leave the runs out"
-        return (Remark(Outcome.REFUSED, ids, what, remedy),)
-    return ()
+        return Remark(Outcome.REFUSED, ids, what, remedy)
+    return None
 
 
 def _jumps(phases: list[_Phase], place: int, squares: float) -> bool:
@@ -192,7 +192,7 @@ class _Decaying:
         return ends and abs(self.lead - self.expected) < _LEAD * self.expected
 
 
-def coupled_sensor(evidence: SlipEvidence) -> tuple[Remark, ...]:
+def coupled_sensor(evidence: SlipEvidence) -> Remark | None:
     """The centre decays to zero and the oscillation leads, with one time constant. Refused: it looks like a drift.
 
     The sensor is AC-coupled, with a high-pass filter before the logger. Its reading of a release is an oscillation
@@ -200,20 +200,20 @@ def coupled_sensor(evidence: SlipEvidence) -> tuple[Remark, ...]:
     the centre, but without the lead; a drift does not end at zero.
     """
     if evidence.campaign.sensor.derivative or not evidence.swings:
-        return ()
+        return None
     decaying = [one for swing in evidence.swings if (one := _decaying(swing)) is not None]
     found = [one for one in decaying if one.coupled]
     if 2 * len(found) <= len(decaying):  # one sensor reads all runs; with a drift some lead by chance
-        return ()
+        return None
     if len(found) == 1 < len(evidence.swings) and found[0].constant < _LASTING * found[0].period:
-        return ()
+        return None
     constant = float(np.median([one.constant for one in found]))
     what = (
         f"the centre of the motion decays to zero with a time constant of about {constant:.2g} s, and the "
         "reading leads as by a high-pass filter of that constant: the sensor or the logger is AC-coupled"
     )
     remedy = "record with DC coupling, or leave the runs out"
-    return (Remark(Outcome.REFUSED, tuple(one.run for one in found), what, remedy),)
+    return Remark(Outcome.REFUSED, tuple(one.run for one in found), what, remedy)
 
 
 def _decaying(swing: Swing) -> _Decaying | None:

@@ -38,7 +38,7 @@ class OtherGain:
     std: float
 
 
-def odd_gain(evidence: SlipEvidence) -> tuple[Remark, ...]:
+def odd_gain(evidence: SlipEvidence) -> Remark | None:
     """Noise and swing of one run are the others' times one factor. Named: ωn and ζ do not change.
 
     In a linear decay another gain, such as another range of the amplifier, looks like another release. But it
@@ -46,7 +46,7 @@ def odd_gain(evidence: SlipEvidence) -> tuple[Remark, ...]:
     """
     found = other_gain(evidence)
     if found is None:
-        return ()
+        return None
     what = (
         "its noise, and its swing over the stated release_angle, are both "
         f"{with_std(found.ratio, found.std)} times those of the other runs: the sensor had another gain"
@@ -55,7 +55,7 @@ def odd_gain(evidence: SlipEvidence) -> tuple[Remark, ...]:
         "check the range of its amplifier and repeat the run, or leave the run out with "
         f"--leave-out {found.run.id}"
     )
-    return (Remark(Outcome.NOTED, (found.run.id,), what, remedy),)
+    return Remark(Outcome.NOTED, (found.run.id,), what, remedy)
 
 
 def other_gain(evidence: SlipEvidence) -> OtherGain | None:
@@ -157,17 +157,17 @@ _SPREAD = 1.7  # maximum ratio of the other runs' noise: they have one sensor
 _SPREADS = 4.0  # logarithms of that ratio
 
 
-def odd_noise(evidence: SlipEvidence) -> tuple[Remark, ...]:
+def odd_noise(evidence: SlipEvidence) -> Remark | None:
     """One run has far less or far more noise than all others, in some band of frequencies. Named.
 
     It has another range, sensor, cable or filter. A run with far less noise is refused: a filter smooths its
     start, which looks like other oscillations.
     """
     if len(evidence.swings) < _FEWEST_COMPARED or other_gain(evidence) is not None:
-        return ()
+        return None
     bands, power = _powers(evidence.swings)
     if not bands.size:
-        return ()
+        return None
     logs = 0.5 * np.log(power)
     pressure = np.array([(s.run.air_density or 0.0) * s.run.wind_speed**2 for s in evidence.swings])
     for place, swing in enumerate(evidence.swings):
@@ -179,12 +179,12 @@ def odd_noise(evidence: SlipEvidence) -> tuple[Remark, ...]:
         odd = np.abs(ratio) > np.maximum(np.log(policy.ODD_NOISE), _SPREADS * spread)
         less, more = odd & (ratio < 0.0), odd & (ratio > 0.0)
         if less.any() and np.any(winds <= pressure[place]):
-            return (_less(swing, float(bands[less][0]), float(ratio.min())),)
+            return _less(swing, float(bands[less][0]), float(ratio.min()))
         if more.any() and np.any(winds >= pressure[place]):
             what = f"its noise is {np.exp(ratio.max()):.2g} times as large as that of every other run"
             remedy = "check the sensor's range, its cable and the unit, or leave the run out"
-            return (Remark(Outcome.NOTED, (swing.run.id,), what, remedy),)
-    return ()
+            return Remark(Outcome.NOTED, (swing.run.id,), what, remedy)
+    return None
 
 
 def _less(swing: Swing, first: float, ratio: float) -> Remark:
@@ -230,7 +230,7 @@ _FEWEST_SIDES = 3  # minimum number of runs: of two different zeros, either may 
 _NEAR = 0.25
 
 
-def mirrored_run(evidence: SlipEvidence) -> tuple[Remark, ...]:
+def mirrored_run(evidence: SlipEvidence) -> Remark | None:
     """Some runs swing about the zero of the others with its sign inverted. Refused: it looks like an effect.
 
     A mirrored decay is also a decay. Only asymmetries reveal it: the sensor's zero, which changes its sign in a
@@ -238,7 +238,7 @@ def mirrored_run(evidence: SlipEvidence) -> tuple[Remark, ...]:
     """
     swings = evidence.swings
     if len(swings) < _FEWEST_SIDES or evidence.stated.sensor.zero == "per_run":
-        return ()
+        return None
     zeros = np.array([swing.zero for swing in swings])
     std = np.array([max(swing.zero_std, 1e-300) for swing in swings])
     size = float(np.median(np.abs(zeros)))
@@ -246,16 +246,16 @@ def mirrored_run(evidence: SlipEvidence) -> tuple[Remark, ...]:
     minus = zeros < 0.0
     odd = minus if 2 * minus.sum() < zeros.size else ~minus
     if not odd.any() or odd.all():
-        return ()
+        return None
     upright = np.where(odd, -zeros, zeros)
     freedom, allowed = zeros.size - 1, np.hypot(std, policy.ZERO_STEADINESS * size)
     agree = _scatter(upright, allowed) <= float(chdtri(freedom, policy.MISFIT_RATE))
     differ = _scatter(zeros, allowed) > float(chdtri(freedom, policy.REFUSAL_RATE))
     if not (agree and differ) or float(np.ptp(np.abs(zeros))) > _NEAR * size:
-        return ()
+        return None
     halves = 2 * int(odd.sum()) == zeros.size
     if _of_wind(swings, odd):
-        return ()
+        return None
     names = tuple(s.run.id for s, one in zip(swings, odd, strict=True) if one)
     rest = tuple(s.run.id for s, one in zip(swings, odd, strict=True) if not one)
     ids = names + rest if halves else names
@@ -264,9 +264,7 @@ def mirrored_run(evidence: SlipEvidence) -> tuple[Remark, ...]:
         f"{who} {'swing' if halves else 'swings'} about {_signed(swings, odd)} {evidence.campaign.sensor.unit} "
         f"and the others about {_signed(swings, ~odd)}: the sign of the sensor is inverted between them"
     )
-    return (
-        Remark(Outcome.REFUSED, ids, what, "invert the sign of these readings, or state zero = 'per_run'"),
-    )
+    return Remark(Outcome.REFUSED, ids, what, "invert the sign of these readings, or state zero = 'per_run'")
 
 
 def _scatter(values: Array, std: Array) -> float:
@@ -290,10 +288,10 @@ def _of_wind(swings: tuple[Swing, ...], odd: NDArray[np.bool_]) -> bool:
     return len(conditions) == 1 and bool(np.all(odd == windy) or np.all(odd == ~windy))
 
 
-def release_on_the_other_side(evidence: SlipEvidence) -> tuple[Remark, ...]:
+def release_on_the_other_side(evidence: SlipEvidence) -> Remark | None:
     """A stated release angle of the opposite sign to the record. Asked about: no answer depends on it."""
     if evidence.campaign.sensor.derivative:
-        return ()
+        return None
     ids = []
     for swing in evidence.swings:
         stated, first = swing.run.release_angle or 0.0, float(swing.motion[0])
@@ -303,16 +301,16 @@ def release_on_the_other_side(evidence: SlipEvidence) -> tuple[Remark, ...]:
         if turning and decays and -high < first / (stated or np.inf) < -low:
             ids.append(swing.run.id)
     if not ids:
-        return ()
+        return None
     what = "the record begins on the other side than the stated release_angle"
     remedy = "correct the sign of release_angle, or of the readings"
-    return (Remark(Outcome.NOTED, tuple(ids), what, remedy),)
+    return Remark(Outcome.NOTED, tuple(ids), what, remedy)
 
 
 _SUSPICIOUS = 10.0  # maximum ratio to the amplitudes of other runs; beyond it the noise is compared
 
 
-def angle_in_degrees(evidence: SlipEvidence) -> tuple[Remark, ...]:
+def angle_in_degrees(evidence: SlipEvidence) -> Remark | None:
     """Amplitude and noise of some runs are 57.3 times the others', or 1/57.3 of them. Refused.
 
     For displacements in millimetres the factor is 1000.
@@ -320,11 +318,11 @@ def angle_in_degrees(evidence: SlipEvidence) -> tuple[Remark, ...]:
     The smaller group of runs is wrong; of two equal groups either may be wrong.
     """
     if len(evidence.swings) < 2 or evidence.campaign.sensor.plausible is False:
-        return ()
+        return None
     amplitudes = np.array([swing.amplitude for swing in evidence.swings])
     large = amplitudes > _SUSPICIOUS * float(amplitudes.min())
     if not large.any():
-        return ()
+        return None
     noise = np.array([measured_noise(swing.run.record)[0] for swing in evidence.swings])
     ratio = float(np.median(noise[large]) / np.median(noise[~large]))
     alike = [
@@ -333,7 +331,7 @@ def angle_in_degrees(evidence: SlipEvidence) -> tuple[Remark, ...]:
     if abs(ratio / evidence.campaign.sensor.freedom.slip - 1.0) > policy.NOISE_RATIO or not all(
         np.all(one) for one in alike
     ):
-        return ()
+        return None
     ids = [
         tuple(s.run.id for s, one in zip(evidence.swings, some, strict=True) if one)
         for some in (large, ~large)
@@ -344,9 +342,9 @@ def angle_in_degrees(evidence: SlipEvidence) -> tuple[Remark, ...]:
     )
     if len(ids[0]) < len(ids[1]):
         remedy = "name the column yaw_deg, or convert it to radians"
-        return (Remark(Outcome.REFUSED, ids[0], exceed, remedy),)
+        return Remark(Outcome.REFUSED, ids[0], exceed, remedy)
     if len(ids[0]) > len(ids[1]):
-        return (Remark(Outcome.REFUSED, ids[1], below, "name the column yaw_rad, or convert it to degrees"),)
+        return Remark(Outcome.REFUSED, ids[1], below, "name the column yaw_rad, or convert it to degrees")
     what = f"{exceed}; or, of runs {', '.join(ids[1])}, {below}"
     remedy = "name the columns yaw_deg or yaw_rad by their units"
-    return (Remark(Outcome.REFUSED, ids[0] + ids[1], what, remedy),)
+    return Remark(Outcome.REFUSED, ids[0] + ids[1], what, remedy)

@@ -133,7 +133,7 @@ class _Trial:
 Trials = Callable[[Statements, Sequence[int]], Iterator[_Trial]]
 
 
-def wrong_label(evidence: SlipEvidence) -> tuple[Remark, ...]:
+def wrong_label(evidence: SlipEvidence) -> Remark | None:
     """One run's label contradicts the others grossly, and agrees if a common slip is undone. Refused."""
     return _found(evidence, _of_one_run)
 
@@ -145,7 +145,7 @@ def _of_one_run(statements: Statements, suspects: Sequence[int]) -> Iterator[_Tr
             yield from _relabelled(statements, label, (place,))
 
 
-def wrong_labels(evidence: SlipEvidence) -> tuple[Remark, ...]:
+def wrong_labels(evidence: SlipEvidence) -> Remark | None:
     """Labels of two runs or settings are exchanged, or one slip is in two runs or a whole setting. Refused."""
     return _found(evidence, _of_several_runs)
 
@@ -206,11 +206,11 @@ def _mended(evidence: SlipEvidence, trials: Trials) -> tuple[Statements | None, 
     return statements, mended
 
 
-def _found(evidence: SlipEvidence, trials: Trials) -> tuple[Remark, ...]:
+def _found(evidence: SlipEvidence, trials: Trials) -> Remark | None:
     """A refusal that names the runs; none if the statements may be right, or no slip agrees."""
     statements, mended = _mended(evidence, trials)
     if statements is None or not mended:
-        return ()
+        return None
     limit = min(squares for _, squares in mended) + _TIE
     mended = [(trial, squares) for trial, squares in mended if squares <= limit]
     best: dict[tuple[int, ...], _Trial] = {}
@@ -222,7 +222,7 @@ def _found(evidence: SlipEvidence, trials: Trials) -> tuple[Remark, ...]:
     ids = tuple(dict.fromkeys(statements.runs[i].id for trial in shown for i in trial.places))
     what = f"the stated values contradict the frequencies of the other runs, which agree with {said}"
     names = " or ".join(dict.fromkeys(name for trial in shown for name in trial.names))
-    return (Remark(Outcome.REFUSED, ids, what, f"correct {names}, or leave the run out"),)
+    return Remark(Outcome.REFUSED, ids, what, f"correct {names}, or leave the run out")
 
 
 def _relabelled(statements: Statements, label: Label, places: tuple[int, ...]) -> Iterator[_Trial]:

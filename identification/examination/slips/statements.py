@@ -16,7 +16,7 @@ from identification.status import WITHHOLDS, Outcome, Remark
 from tunnel_sim.vocabulary.campaign import speed_groups
 
 
-def motion_grows(evidence: SlipEvidence) -> tuple[Remark, ...]:
+def motion_grows(evidence: SlipEvidence) -> Remark | None:
     """Wind-off runs grow: their decay rate is negative beyond chance, and their swings become larger. Refused.
 
     A blow in mid-record does not show both.
@@ -30,10 +30,10 @@ def motion_grows(evidence: SlipEvidence) -> tuple[Remark, ...]:
             ids.append(swing.run.id)
     what = "the motion grows with the wind off, which is impossible on a passive rig"
     remedy = "check whether time runs backwards in the file, state the wind speed, or remove the run"
-    return (Remark(Outcome.REFUSED, tuple(ids), what, remedy),) if ids else ()
+    return Remark(Outcome.REFUSED, tuple(ids), what, remedy) if ids else None
 
 
-def equal_statements_differ(evidence: SlipEvidence) -> tuple[Remark, ...]:
+def equal_statements_differ(evidence: SlipEvidence) -> Remark | None:
     """Runs of equal spring, wind and swing differ in frequency or damping more than under one condition. Refused.
 
     This includes labels copied from run to run. The values with which the runs would agree are not known.
@@ -56,13 +56,13 @@ def equal_statements_differ(evidence: SlipEvidence) -> tuple[Remark, ...]:
             ids += [swing.run.id for swing in group]
             largest = max(largest, (stiffness, damping))
     if not ids:
-        return ()
+        return None
     what = (
         f"they state equal springs and winds, and differ by {100.0 * np.expm1(largest[0]):.2g} % or more in "
         f"omega_n^2 and {100.0 * np.expm1(largest[1]):.2g} % or more in damping"
     )
     remedy = "correct spring_stiffness or wind_speed of these runs, which may be copied from one another"
-    return (Remark(Outcome.REFUSED, tuple(ids), what, remedy),)
+    return Remark(Outcome.REFUSED, tuple(ids), what, remedy)
 
 
 def _apart(low: Swing, high: Swing) -> tuple[float, float]:
@@ -121,22 +121,22 @@ def _changes(swings: tuple[Swing, ...]) -> list[_Change]:
     return changes
 
 
-def wind_not_seen(evidence: SlipEvidence) -> tuple[Remark, ...]:
+def wind_not_seen(evidence: SlipEvidence) -> Remark | None:
     """No wind-on run differs in frequency or decay rate from the wind-off runs of its spring. Asked about.
 
     Nothing is asked where the records would not show a difference.
     """
     changes = _changes(evidence.swings)
     if not changes:
-        return ()
+        return None
     for change in changes:
         damping_std = float(np.hypot(change.damping_std, policy.SCATTER_OF_DAMPING))
         if abs(change.stiffness) + policy.MISFIT_DEVIATIONS * change.stiffness_std > policy.LEAST_OF_WIND:
-            return ()
+            return None
         if abs(change.damping) > policy.MISFIT_DEVIATIONS * damping_std:
-            return ()
+            return None
         if policy.MISFIT_DEVIATIONS * damping_std > policy.LEAST_DAMPING_OF_WIND:
-            return ()
+            return None
     largest = (
         max(abs(change.stiffness) for change in changes),
         max(abs(change.damping) for change in changes),
@@ -146,10 +146,10 @@ def wind_not_seen(evidence: SlipEvidence) -> tuple[Remark, ...]:
         f"% and {100.0 * largest[1]:.2g} %: no body has so small an aerodynamic moment"
     )
     ids = tuple(change.swing.run.id for change in changes)
-    return (Remark(Outcome.NOTED, ids, what, "check whether the fan was on, and wind_speed"),)
+    return Remark(Outcome.NOTED, ids, what, "check whether the fan was on, and wind_speed")
 
 
-def wind_exchanged(evidence: SlipEvidence) -> tuple[Remark, ...]:
+def wind_exchanged(evidence: SlipEvidence) -> Remark | None:
     """All labels of wind on and off are exchanged: the wind seems to reduce the damping, and the springs disagree.
 
     Refused where the springs agree after an exchange: either sign alone may be an effect.
@@ -160,23 +160,23 @@ def wind_exchanged(evidence: SlipEvidence) -> tuple[Remark, ...]:
     speeds = set(speed_groups(s.run.wind_speed for s in swings if s.run.wind_on).values())
     changes = _changes(swings)
     if len(speeds) != 1 or len({c.swing.run.spring_stiffness for c in changes}) == 1:
-        return ()
+        return None
     less = [-c.damping / float(np.hypot(c.damping_std, policy.SCATTER_OF_DAMPING)) for c in changes]
     if min(less, default=0.0) < policy.REFUSAL_DEVIATIONS:
-        return ()
+        return None
     labels = Statements.of(swings)
     tight = {"departure": policy.SPRING_TOLERANCE, "of_speed": policy.SPRING_TOLERANCE}
     stated = agreement(labels, **tight)
     exchanged = agreement(replace(labels, speed=speeds.pop() - labels.speed), **tight)
     gain = stated.squares - exchanged.squares
     if gain <= float(chdtri(1, policy.MISFIT_RATE)) or not exchanged.good:
-        return ()
+        return None
     what = (
         "as stated the wind reduces the damping and the springs disagree; they agree if the wind speeds of "
         "the runs with the wind on and off are exchanged"
     )
     ids = tuple(swing.run.id for swing in swings)
-    return (Remark(Outcome.REFUSED, ids, what, "correct wind_speed or the file names of these runs"),)
+    return Remark(Outcome.REFUSED, ids, what, "correct wind_speed or the file names of these runs")
 
 
 _KEEP = "or state plausible = false under [sensor]"
@@ -194,32 +194,32 @@ _OF_DENSITY = {
 }
 
 
-def yaw_moment_too_large(evidence: SlipEvidence) -> tuple[Remark, ...]:
+def yaw_moment_too_large(evidence: SlipEvidence) -> Remark | None:
     """|Cnβ| too large for any body: a stiffness, a speed or a size in a wrong unit. Asked about."""
     area, length = evidence.campaign.rig.frontal_area, evidence.campaign.rig.reference_length
     swings = [s for s in evidence.swings if s.run.spring_stiffness]
     windy = [s.run.id for s in swings if s.run.wind_on]
     if not windy or area is None or length is None or not _judged(evidence):
-        return ()
+        return None
     found = agreement(Statements.of(swings))
     if found.freedom < 0 or not found.inverse_inertia > 0.0:
-        return ()
+        return None
     # a stated inertia that contradicts the springs has its own remark
     inertia = min(evidence.campaign.rig.yaw_inertia or np.inf, 1.0 / found.inverse_inertia)
     scale = area * length / inertia
     value, std = found.air / scale, found.air_std / scale
     if abs(value) - policy.MISFIT_DEVIATIONS * std <= policy.GREATEST_YAW_MOMENT:
-        return ()
+        return None
     what = (
         f"the frequencies give Cn_beta = {value:.3g} 1/rad, and no body has more than "
         f"{policy.GREATEST_YAW_MOMENT:g}: a value is in a wrong unit (spring_stiffness in N mm/rad or N cm/rad"
         ", wind_speed, air_density or a size)"
     )
     remedy = f"give them in SI units, {_KEEP}"
-    return (Remark(Outcome.NOTED, tuple(windy), what, remedy, {WITHHOLDS: True}),)
+    return Remark(Outcome.NOTED, tuple(windy), what, remedy, {WITHHOLDS: True})
 
 
-def inertia_of_no_body(evidence: SlipEvidence) -> tuple[Remark, ...]:
+def inertia_of_no_body(evidence: SlipEvidence) -> Remark | None:
     """An inertia, by the springs, that no body of the stated sizes can have. Asked about, with the likely slips.
 
     If an inertia is stated, it is compared instead: it is more accurate.
@@ -230,12 +230,12 @@ def inertia_of_no_body(evidence: SlipEvidence) -> tuple[Remark, ...]:
     still = [s for s in evidence.swings if s.run.spring_stiffness and not s.run.wind_on]
     stated = evidence.campaign.rig.yaw_inertia is not None
     if stated or not still or area is None or length is None or not _judged(evidence):
-        return ()
+        return None
     inertia = float(np.median([(s.run.spring_stiffness or 0.0) / s.stiffness for s in still]))
     density = _SLENDER * inertia / (area * length**3)
     low, high = policy.BODY_DENSITIES
     if low <= density <= high:
-        return ()
+        return None
     likely = [words for words, factor in _OF_DENSITY.items() if low <= density / factor <= high]
     looks = f"; it looks like {' or '.join(likely)}" if likely else ""
     what = (
@@ -243,7 +243,7 @@ def inertia_of_no_body(evidence: SlipEvidence) -> tuple[Remark, ...]:
         f"reference_length has at a density of {density:.2g} kg/m3{looks}"
     )
     remedy = f"check the units of spring_stiffness, time_s, frontal_area and reference_length, {_KEEP}"
-    return (Remark(Outcome.NOTED, tuple(s.run.id for s in still), what, remedy, {WITHHOLDS: True}),)
+    return Remark(Outcome.NOTED, tuple(s.run.id for s in still), what, remedy, {WITHHOLDS: True})
 
 
 def _judged(evidence: SlipEvidence) -> bool:

@@ -67,14 +67,15 @@ def mended(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
 
 def found_in(evidence: SlipEvidence) -> tuple[Remark, ...]:
     """Remarks on the statements that the measured oscillations contradict; only the refusal if there is one."""
-    remarks: tuple[Remark, ...] = ()
+    remarks = []
     with np.errstate(all="ignore"):
         for slip in STATEMENT_SLIPS:
             try:
                 said = slip(evidence)
             except np.linalg.LinAlgError:  # values too far apart to be compared
                 continue
-            remarks += said
-            if any(remark.outcome is Outcome.REFUSED for remark in said):
-                return said
-    return remarks
+            if said is not None:
+                remarks.append(said)
+            if said is not None and said.outcome is Outcome.REFUSED:
+                return (said,)
+    return tuple(remarks)
