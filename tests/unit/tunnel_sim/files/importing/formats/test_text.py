@@ -149,6 +149,9 @@ def test_texts_among_the_numbers_are_said(tmp_path: Path) -> None:
     [
         (b"", "the file is empty", "name a file"),
         (b"\x89HDF\r\n\x1a\n", "it begins like an HDF5 file", "ending of its format"),
+        (b"\x89MCAP0\r\n0,1\n1,2\n", "it begins like an MCAP log", "ending of its format"),
+        (b"SQLite format 3\x000,1\n", "it begins like a log of ROS 2", "ending of its format"),
+        (b"MDF     4.10    0,1\n1,2\n", "it begins like an MDF file", "ending of its format"),
         (b"time,angle\n0,1\0\n", "NUL bytes", "ending of its format"),
         (b"all\nwords\nhere\n", "no columns of numbers", "--delimiter"),
         (b"a,b,c\n" + b"".join(b"%d.5,%d,%d\n" % (i, i * i % 7, i * i % 5) for i in range(99)),
