@@ -94,16 +94,16 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("cycles", [True, False])
-def test_runs_that_are_no_decays_have_no_trade_off_and_no_caveat_on_causes(cycles):
+def test_runs_that_are_no_decays_have_no_trade_off_and_no_caveat_on_causes():
     data = campaign(QUADRATIC)
-    found = investigate(replace(data, runs=data.runs[:2]), ())
-    chosen = Chosen(found.campaign, found.campaign, found.model, (), (), (), limit_cycles=cycles)
-    answer = composed(Confirmed.of(found), chosen, Question(None, (), (), lambda _: None))
-    assert ("few runs" in [fact.kind for fact in answer.found.cautions]) is not cycles
-    assert answer.trade_off is None or not cycles
-    answer = composed(Confirmed.of(investigate(data, ())), chosen, Question(None, (), (), lambda _: None))
-    assert (answer.repeatability is None) is cycles
+    few, all_runs = (investigate(replace(data, runs=runs), ()) for runs in (data.runs[:2], data.runs))
+    for cycles in (True, False):
+        chosen = Chosen(few.campaign, few.campaign, few.model, (), (), (), limit_cycles=cycles)
+        question = Question(None, (), (), lambda _: None)
+        answer = composed(Confirmed.of(few), chosen, question)
+        assert ("few runs" in [fact.kind for fact in answer.found.cautions]) is not cycles
+        assert answer.trade_off is None or not cycles
+        assert (composed(Confirmed.of(all_runs), chosen, question).repeatability is None) is cycles
 
 
 @cache
@@ -218,7 +218,7 @@ def test_records_without_noise_are_answered_with_a_status(effect, causes):
 
 
 def test_the_probability_in_words_is_that_of_the_first_candidate(found):
-    answer = answer_of(found)
+    answer, _ = named()
     assert f"(probability {100.0 * answer.candidates[0].probability:.0f} %)" in answer.verdict
     doubtful = replace(found, gap=replace(found.gap, test=replace(found.gap.test, p_value=9e-4)))
     (none,) = [c for c in candidates(doubtful, excess_base(doubtful)) if c.effect == "none"]

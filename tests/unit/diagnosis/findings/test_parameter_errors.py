@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from diagnosis import diagnose, vocabulary
+from diagnosis import Diagnosis, diagnose, vocabulary
 from diagnosis.answer.held_out import excess_base, one_more
 from diagnosis.answer.linear_theory import coefficient_move, move_of_halves, parameter_shift
 from diagnosis.findings.by_run import sizes
@@ -78,9 +78,8 @@ def rubbing(
     return Campaign("rubs", RigProperties(), SensorProperties(rate), tuple(runs))
 
 
-def errors(data: Campaign, truth: dict[str, float]) -> dict[str, float]:
+def errors(found: Diagnosis, truth: dict[str, float]) -> dict[str, float]:
     """Errors of the parameters over their stated standard deviations."""
-    found = diagnose(data, kinds=KINDS)
     assert found.causes == ("coulomb_friction",)
     given = found.candidates[0].parameters
     assert given.keys() == truth.keys()  # the form is the planted one
@@ -91,9 +90,10 @@ def test_the_form_is_found_where_the_wrong_one_leaves_no_more_than_the_noise():
     """Constant friction leaves χ² 582 of 500 readings, the planted law 420."""
     size, rise = 0.02022405452312456, 0.2541128870464713
     data = rubbing(saturating(size, rise), (0.35,), 1.9994478717260255e-05, 8, 200.0)
-    found = errors(data, {"friction_moment": size, "saturation": rise})
+    answered = diagnose(data, kinds=KINDS)
+    found = errors(answered, {"friction_moment": size, "saturation": rise})
     assert max(map(abs, found.values())) < 3.0
-    words = " ".join(diagnose(data, kinds=KINDS).cautions)
+    words = " ".join(answered.cautions)
     assert "Not determined: one release amplitude" in words
     assert "the saturation of coulomb friction may be wrong" in words
 
@@ -114,7 +114,8 @@ def test_the_errors_of_planted_laws_are_those_stated(law):
         values = [float(rng.uniform(*one)) for one in ranges]
         noise, releases = 10.0 ** rng.uniform(-5.0, -3.5), ((0.35, 0.2), (0.3, 0.15, 0.1))[seed % 2]
         data = rubbing(make(*values), releases, noise, seed, 100.0 * (1 + seed % 2))
-        found.append(list(errors(data, dict(zip(names, values, strict=True))).values()))
+        answered = diagnose(data, kinds=KINDS)
+        found.append(list(errors(answered, dict(zip(names, values, strict=True))).values()))
     rms = np.sqrt(np.mean(np.square(found)))
     assert 0.5 < rms < 2.0
 

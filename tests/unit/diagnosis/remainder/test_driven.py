@@ -57,7 +57,8 @@ def campaign(rise: float, by_angle: float = 0.0, load: float = 0.0) -> Campaign:
 
 
 def answer(rise: float, by_angle: float = 0.0, load: float = 0.0) -> Diagnosis:
-    return diagnose(campaign(rise, by_angle, load), kinds=vocabulary(include=["coulomb_friction"]))
+    kinds = vocabulary(include=["coulomb_friction"])
+    return diagnose(campaign(rise, by_angle, load), kinds=kinds, rivals=())
 
 
 def test_the_rise_of_friction_at_low_rates_is_a_form_of_dry_friction() -> None:
