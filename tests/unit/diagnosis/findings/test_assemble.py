@@ -94,6 +94,7 @@ CASES = {
 }
 
 
+@pytest.mark.usefixtures("causes_alone")
 def test_runs_that_are_no_decays_have_no_trade_off_and_no_caveat_on_causes():
     data = campaign(QUADRATIC)
     few, all_runs = (investigate(replace(data, runs=runs), ()) for runs in (data.runs[:2], data.runs))

@@ -14,6 +14,8 @@ from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
 
+pytestmark = pytest.mark.usefixtures("causes_alone")
+
 
 def campaign(*modes: tuple[float, float, float], seconds: float = 20.0) -> Campaign:
     """One run with oscillations given by amplitude (rad), frequency (Hz) and decay rate (1/s)."""
