@@ -54,4 +54,4 @@ def test_an_episode_with_moments_is_identified_as_a_driven_run(tmp_path: Path) -
 def test_the_cause_of_an_episode_with_moments_is_named(tmp_path: Path) -> None:
     bent = campaign({"cubic_stiffness": {"coefficient": 0.5}}, tmp_path / "bent")
     kinds = [effect_class(name) for name in ("cubic_stiffness", "coulomb_friction", "input_delay")]
-    assert diagnose(bent, kinds=kinds).causes == ("cubic_stiffness",)
+    assert diagnose(bent, kinds=kinds, rivals=()).causes == ("cubic_stiffness",)

@@ -309,9 +309,8 @@ def through(**actuator: Any) -> Campaign:
 )
 def test_each_is_named_with_its_value(name: str, value: float) -> None:
     """The lag is 0.4 of the reciprocal of the resonance's angular frequency, where it is not a delay."""
-    found = diagnose(
-        through(**{"lags": (value,)} if name == "actuator_lag" else {NULL[name]: value}), kinds=KINDS
-    )
+    data = through(**{"lags": (value,)} if name == "actuator_lag" else {NULL[name]: value})
+    found = diagnose(data, kinds=KINDS, rivals=())
     assert found.causes == (name,)
     own = found.candidates[0].parameters[NULL[name]]
     assert own.std is not None
