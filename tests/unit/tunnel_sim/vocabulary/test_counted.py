@@ -54,9 +54,10 @@ def plurals(source: str) -> Iterator[int]:
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.JoinedStr):
             for value, text in zip(node.values, node.values[1:], strict=False):
-                if isinstance(value, ast.FormattedValue) and isinstance(text, ast.Constant):
+                counts = isinstance(value, ast.FormattedValue) and isinstance(text, ast.Constant)
+                if counts and PLURAL.match(str(text.value)):
                     name = ast.unparse(value.value)
-                    if PLURAL.match(str(text.value)) and not name.rpartition(".")[2].strip("_").isupper():
+                    if not name.rpartition(".")[2].strip("_").isupper():
                         yield node.lineno
 
 
