@@ -46,6 +46,13 @@ def found(errors: np.ndarray) -> RunRepeatability:
     return given
 
 
+@pytest.fixture(scope="module")
+def by_chance() -> tuple[np.ndarray, RunRepeatability]:
+    """Relative errors of the wind, and what is found of runs in it."""
+    errors = np.random.default_rng(3).normal(0.0, 0.006, len(CONDITIONS))
+    return errors, found(errors)
+
+
 def test_a_wind_that_drifts_over_the_campaign_is_no_chance() -> None:
     rng, order = np.random.default_rng(1), np.linspace(-0.5, 0.5, len(CONDITIONS))
     given = found(0.02 * order + rng.normal(0.0, 0.0005, order.size))
@@ -93,10 +100,12 @@ def test_scatter_that_follows_a_pattern_is_not_answered_with_the_remedy_of_chanc
         assert RunRepeatability((spread,), trends=others).pattern_step(SPEED) is None
 
 
-def test_a_wind_that_differs_by_chance_does_not_drift() -> None:
-    errors = np.random.default_rng(3).normal(0.0, 0.006, len(CONDITIONS))
-    given = found(errors)
+def test_a_wind_that_differs_by_chance_does_not_drift(
+    by_chance: tuple[np.ndarray, RunRepeatability],
+) -> None:
+    errors, given = by_chance
     assert given.trends == ()
+    assert given.limits is None  # of a scatter that is not found
     spread = next(one for one in given.spreads if one.effect == SPEED)
     assert spread.shown
     assert spread.interval[0] < 0.006 < spread.interval[1]
@@ -106,8 +115,10 @@ def test_a_wind_that_differs_by_chance_does_not_drift() -> None:
     assert np.corrcoef(own, errors[windy])[0, 1] > 0.95
 
 
-def test_frequencies_of_the_runs_are_those_of_the_measured_rig() -> None:
-    given = found(np.random.default_rng(3).normal(0.0, 0.006, len(CONDITIONS)))
+def test_frequencies_of_the_runs_are_those_of_the_measured_rig(
+    by_chance: tuple[np.ndarray, RunRepeatability],
+) -> None:
+    _, given = by_chance
     still = given.runs[0]  # without wind: √(Kr/Izz) by the numbers of the small campaigns
     assert still.frequency_hz == pytest.approx(np.sqrt(16.12 / 0.11) / (2.0 * np.pi), rel=1e-3)
     slower = Similarity(time=2.0)
@@ -177,10 +188,6 @@ def test_few_noisy_runs_say_nothing_about_scatter() -> None:
     )
     sensor = replace(data.sensor, noise_std=0.05)
     assert limits(replace(data, runs=runs, sensor=sensor)) == ScatterLimits(None, None)
-
-
-def test_where_scatter_is_found_no_limit_is_stated() -> None:
-    assert found(np.random.default_rng(3).normal(0.0, 0.006, len(CONDITIONS))).limits is None
 
 
 def test_runs_without_damping_have_no_relative_deviation_of_it() -> None:
