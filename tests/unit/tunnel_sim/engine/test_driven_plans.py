@@ -1,4 +1,4 @@
-"""Driven runs from a plan to an answer. The truth is that of the plan."""
+"""Driven runs from a plan to an estimate. The truth is that of the plan."""
 
 from __future__ import annotations
 
@@ -8,15 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagnosis import diagnose
 from identification import identify
 from tests.support.plans import planned
-from tunnel_sim.effects import effect_class
 from tunnel_sim.engine.virtual_campaign import plan_effects, simulate_campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import CampaignPlan, EffectSetting
-
-pytestmark = pytest.mark.usefixtures("causes_alone")
 
 PLAN = """
 name = "driven"
@@ -31,7 +27,6 @@ sensor.sample_rate = 100.0
 MOMENT, ROOT = "amplitudes_nm = [0.3]", "amplitudes_rad = [0.03]"
 BAND = "from_hz = 0.5\nto_hz = 5.0\n"
 MULTISINE = f'{PLAN.replace("12.0", "8.0")}kind = "multisine"\n{BAND}amplitudes_nm = [0.2, 0.8]\n'
-KINDS = [effect_class(name) for name in ("coulomb_friction", "quadratic_damping", "cubic_stiffness")]
 
 
 def with_effect(plan: CampaignPlan, name: str, **parameters: float) -> CampaignPlan:
@@ -66,17 +61,6 @@ def test_a_wrong_hold_is_seen(tmp_path: Path) -> None:
     assert found.noise is not None
     assert wrong.noise is not None
     assert (found.noise.departs, wrong.noise.departs) == (False, True)
-
-
-def test_no_cause_is_named_where_there_is_none(tmp_path: Path) -> None:
-    assert diagnose(simulate_campaign(planned(tmp_path, MULTISINE)), kinds=KINDS).causes == ()
-
-
-def test_dry_friction_is_named(tmp_path: Path) -> None:
-    plan = with_effect(planned(tmp_path, MULTISINE), "coulomb_friction", friction_moment=0.004)
-    found = diagnose(simulate_campaign(plan), kinds=KINDS, rivals=())
-    assert found.causes == ("coulomb_friction",)
-    assert found.gap.closed > 0.99
 
 
 def test_the_root_pulls_with_the_true_spring(tmp_path: Path) -> None:

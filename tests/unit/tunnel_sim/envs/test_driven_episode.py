@@ -1,4 +1,4 @@
-"""An episode of the operator preset as a driven run: its record is saved, read again and diagnosed."""
+"""An episode of the operator preset as a driven run: its record is saved, read again and identified."""
 
 from __future__ import annotations
 
@@ -6,10 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from diagnosis import diagnose
 from identification import identify
 from tests.support.env_episodes import make
-from tunnel_sim.effects import effect_class
 from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.inputs import Input
@@ -18,7 +16,7 @@ TRUTH = {"cn_beta": 0.47, "cn_r": -0.1, "yaw_inertia": 0.1, "mechanical_damping"
 RATE, PERIOD = 200.0, 0.05
 
 
-def campaign(effects: dict[str, dict[str, float]], folder: Path) -> Campaign:
+def campaign(folder: Path) -> Campaign:
     """Two episodes in still air with random moments, through the files of a campaign."""
     runs = []
     for seed in range(2):
@@ -28,7 +26,7 @@ def campaign(effects: dict[str, dict[str, float]], folder: Path) -> Campaign:
             "wind_speed": 0.0,
             "release_angle": 0.2,
             "truth": TRUTH,
-            "effects": effects,
+            "effects": {},
         }
         _, stated = env.reset(seed=seed, options=options)
         rng, over = np.random.default_rng(seed), False
@@ -45,13 +43,7 @@ def campaign(effects: dict[str, dict[str, float]], folder: Path) -> Campaign:
 
 
 def test_an_episode_with_moments_is_identified_as_a_driven_run(tmp_path: Path) -> None:
-    found = identify(campaign({}, tmp_path / "nominal"))
+    found = identify(campaign(tmp_path / "episodes"))
     for name in ("yaw_inertia", "mechanical_damping"):
         quantity = getattr(found, name)
         assert abs(quantity.value - TRUTH[name]) < 4.5 * quantity.std
-
-
-def test_the_cause_of_an_episode_with_moments_is_named(tmp_path: Path) -> None:
-    bent = campaign({"cubic_stiffness": {"coefficient": 0.5}}, tmp_path / "bent")
-    kinds = [effect_class(name) for name in ("cubic_stiffness", "coulomb_friction", "input_delay")]
-    assert diagnose(bent, kinds=kinds, rivals=()).causes == ("cubic_stiffness",)
