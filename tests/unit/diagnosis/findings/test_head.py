@@ -16,7 +16,6 @@ from diagnosis.findings.decision import decision
 from diagnosis.findings.head import Head
 from diagnosis.findings.next_steps import next_steps
 from diagnosis.findings.terms import SCATTERS
-from diagnosis.findings.verdict import verdict
 from diagnosis.settings import Settings
 from identification.show.blocks import as_text
 from identification.show.numbers import changed_by, to_interval
@@ -253,16 +252,6 @@ def test_a_caveat_that_changes_the_answer_stands_in_the_head_and_no_other() -> N
     ]
     (warning,) = Head.of(findings_of(given)).warnings
     assert warning.startswith("Only run beta shows coulomb friction")
-
-
-def test_no_number_of_the_head_contradicts_the_verdict() -> None:
-    answer = findings_of(two_causes())
-    said, head = verdict(answer, ""), Head.of(answer)
-    assert "probability" in said
-    assert head.sure.partition(";")[0] in said or "97 %" in head.sure
-    assert "Cnβ falls by 10 % (0.478 → 0.432)" in said
-    assert "0.432" in head.costs
-    assert "0.478" in head.costs
 
 
 def test_the_head_calls_no_coefficient_unchanged_that_the_first_step_corrects() -> None:

@@ -55,12 +55,6 @@ def test_the_run_separates_as_predicted_and_better_than_a_plain_one(rivals):
     assert found.separation > 10.0
 
 
-def test_a_model_is_not_distinguished_from_itself(rivals):
-    found = NextRun.between(rivals[0], rivals[0])
-    assert found is not None
-    assert found.separation == pytest.approx(0.0, abs=1e-6)
-
-
 @pytest.fixture(scope="module")
 def shedding():
     """A fit with vortices, whose phase every run has of its own, and the same with the phases elsewhere."""

@@ -67,13 +67,6 @@ def test_one_probable_answer_needs_no_bars(given: Document) -> None:
     assert rendered.candidates_figure(findings_of(given)) is None
 
 
-def test_a_bar_next_to_all_is_no_whole(given: Document) -> None:
-    given["candidates"][0]["probability"] = 0.9996
-    fig = rendered.candidates_figure(findings_of(given))
-    assert fig is not None
-    assert fig.axes[0].texts[0].get_text() == "> 99 %"
-
-
 def test_points_of_the_closure(given: Document) -> None:
     fig = rendered.closure_figure(findings_of(given))
     axes, runs = fig.axes[0], given["gap"]["runs"]
