@@ -6,7 +6,7 @@ the diagnosis. A contact that yields deflects by Dahl's law and carries that sha
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import copysign, exp, pi, sin
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,9 @@ import pytest
 from diagnosis import diagnose, vocabulary
 from diagnosis.result import Diagnosis
 from diagnosis.search.answer import UNKNOWN
-from diagnosis.search.rivals.friction_by_direction import _grip
+from diagnosis.search.rivals import RIVALS
+from diagnosis.search.rivals.friction_by_direction import FrictionByDirection, _grip
+from diagnosis.search.rivals.rival import Rival
 from tests.marks import slow
 from tests.reference.robot_joints import GEAR, LEVEL, NOISE, RATE, TIME, multisine, robot
 from tests.support.robots import TRUE, inertia, own_model
@@ -95,8 +97,11 @@ def driven(seed: int, yields: float = 0.0, **sizes: tuple[float, float]) -> Camp
     return Campaign("elbow", RigProperties(), SensorProperties(RATE), tuple(runs))
 
 
-def answer(folder: Path, data: Campaign) -> Diagnosis:
-    return diagnose(data, kinds=KINDS, model=own_model(folder, data, MODEL))
+ALONE = (FrictionByDirection(),)
+
+
+def answer(folder: Path, data: Campaign, rivals: Sequence[Rival] = ALONE) -> Diagnosis:
+    return diagnose(data, kinds=KINDS, model=own_model(folder, data, MODEL), rivals=rivals)
 
 
 def stated(found: Diagnosis) -> Mapping[str, Any] | None:
@@ -125,7 +130,7 @@ def near(found: Mapping[str, Any], *truth: float) -> bool:
 def test_a_share_of_the_load_that_differs_is_said_with_both_sizes(
     tmp_path: Path, seed: int, yields: float, shares: tuple[float, float]
 ) -> None:
-    found = answer(tmp_path, driven(seed, yields, moments=(0.1, 0.1), shares=shares))
+    found = answer(tmp_path, driven(seed, yields, moments=(0.1, 0.1), shares=shares), RIVALS)
     assert tuple(found.causes) == UNKNOWN or not found.decision.decided
     figures = stated(found)
     assert figures is not None

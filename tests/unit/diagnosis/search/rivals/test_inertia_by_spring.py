@@ -57,7 +57,8 @@ def test_without_the_rival_it_takes_a_false_name() -> None:
 
 
 def test_a_spring_that_is_not_as_stiff_as_stated_keeps_its_name() -> None:
-    found = diagnose(decays(dict.fromkeys(BY_SPRING, 0.0), {28.3: 0.005}), kinds=KINDS[::2])
+    wrong = decays(dict.fromkeys(BY_SPRING, 0.0), {28.3: 0.005})
+    found = diagnose(wrong, kinds=KINDS[::2], rivals=(InertiaBySpring(),))
     assert tuple(found.causes) == ("spring_miscalibration",)
 
 
