@@ -87,7 +87,8 @@ def test_a_planted_effect_is_named_in_words_and_in_the_json(
 
 
 def test_no_gap_is_an_answer_and_no_failure(tunnel: Tunnel, gap_free: Path, tmp_path: Path) -> None:
-    status, out, err = tunnel("diagnose", gap_free, "--json", tmp_path / "answer.json")
+    words = ("--effects", "sensor_drift", "--json", tmp_path / "answer.json")
+    status, out, err = tunnel("diagnose", gap_free, *words)
     assert status == 0
     assert all(PROGRESS.match(line) for line in err.splitlines())
     document = json.loads((tmp_path / "answer.json").read_text(encoding="utf-8"))
@@ -124,7 +125,7 @@ def test_a_folder_without_a_campaign_is_one_line(tunnel: Tunnel, tmp_path: Path)
 
 def test_one_run_says_what_it_cannot_show(tunnel: Tunnel, tmp_path: Path) -> None:
     data = campaign([Setting(16.12, 0.0)], duration=5.0, rate=500.0, noise=5e-4, rng=np.random.default_rng(2))
-    status, out, _ = tunnel("diagnose", write_campaign(data, tmp_path / "one"))
+    status, out, _ = tunnel("diagnose", write_campaign(data, tmp_path / "one"), "--effects", "sensor_drift")
     assert status == 0
     for text in ("There is one run only", "there is one spring only", "there is no run with the wind on"):
         assert text in out
