@@ -135,12 +135,6 @@ def test_reading_and_identifying_a_campaign_never_imports_the_engine() -> None:
     assert not modules & {"mujoco", "gymnasium", "torch", "matplotlib"}
 
 
-def test_the_command_line_answers_before_it_loads_numpy() -> None:
-    modules = imported_by("import tunnel_lab.cli")
-    assert "tunnel_lab.commands.identify" in modules
-    assert not modules & {"numpy", "scipy", "polars", "pydantic", "mujoco", "torch", "matplotlib"}
-
-
 def test_no_module_of_the_upper_layers_loads_heavy_packages_at_import() -> None:
     modules = imported_by(
         "import importlib, pkgutil\n"

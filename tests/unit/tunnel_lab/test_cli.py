@@ -139,7 +139,7 @@ def processor_time(script: str) -> tuple[float, subprocess.CompletedProcess[str]
 
 
 def test_help_imports_nothing_heavy_and_takes_hardly_longer_than_any_help() -> None:
-    heavy = "{'mujoco', 'torch', 'matplotlib', 'scipy', 'polars', 'gymnasium', 'numpy'}"
+    heavy = "{'mujoco', 'torch', 'matplotlib', 'scipy', 'polars', 'pydantic', 'gymnasium', 'numpy'}"
     script = (
         "import sys\n"
         "from tunnel_lab.cli import main\n"
