@@ -102,7 +102,7 @@ def test_what_acts_later_on_is_found_beside_what_acts_from_the_beginning() -> No
         record = Record(run.record.time_s[: yaw.size], yaw)
         runs.append(replace(run, record=record, drive=replace(run.drive, values=drive)))
     data = replace(driven("moment", SPRING), runs=tuple(runs))
-    kinds = [effect_class(name) for name in ("cubic_stiffness", "dropped_samples", "coulomb_friction")]
+    kinds = [effect_class(name) for name in ("cubic_stiffness", "dropped_samples")]
     settings = cut_to(COUNT)
     in_beginnings = investigate(data, kinds, settings=settings, views=(Beginnings,), rivals=())
     assert in_beginnings.causes == ("cubic_stiffness",)

@@ -68,7 +68,7 @@ def test_differences_are_told_from_effects_after_stretches(answer: Diagnosis) ->
 
 
 def test_stated_differences_do_not_absorb_the_gap(answer: Diagnosis) -> None:
-    stated = diagnose(differing(7, stated=True), kinds=KINDS, rivals=())
+    stated = diagnose(differing(7, stated=True), kinds=CAUSES, rivals=())
     assert stated.causes == ("spring_miscalibration",)
     assert stated.decided
     assert stated.gap.closed > 0.99
