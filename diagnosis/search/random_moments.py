@@ -269,16 +269,24 @@ def _is_random(
     """Whether a residual is neither noise of the reading nor slow, follows no phase or law, and is not inflated.
 
     Args:
+        process: the moment in the residual.
+        fitted: a set at its best point beside the moment, with the sensor's noise alone.
         kinds: the effects that may be named.
     """
     if source.in_every_run and is_of_reading(fitted, process):
         return False
     if follows_the_motion(fitted, process.runs) or obeys_a_law(fitted, source):
         return False
-    return not is_slow(fitted, process, source, kinds) and not is_inflated(process, fitted)
+    least = try_fit(fitted.problem, fitted.point)
+    if least is None:
+        return True
+    # the point beside a strong moment misses the runs by a spring and a damping, which are slow
+    remaining = likeliest(random_moments(least, source), fitted.settings.moment)
+    slow = remaining is None or is_slow(least, remaining, source, kinds)
+    return not slow and not is_inflated(process, fitted, least)
 
 
-def is_inflated(process: ProcessNoise, fitted: Fit) -> bool:
+def is_inflated(process: ProcessNoise, fitted: Fit, least: Fit) -> bool:
     """Whether the residual of a set beside a random moment is far above the least residual of the set.
 
     Least squares follow a random motion in part, so their residual is smaller, but not by more than chance. A noise
@@ -288,10 +296,8 @@ def is_inflated(process: ProcessNoise, fitted: Fit) -> bool:
     Args:
         process: the moment in the residual.
         fitted: a set at its best point beside the moment, with the sensor's noise alone.
+        least: the set fitted by least squares.
     """
-    least = try_fit(fitted.problem, fitted.point)
-    if least is None:
-        return False
     excess, floor = fitted.total - fitted.count, max(least.total - least.count, least.count)
     return excess > floor and excess > most_absorbed(process, least) * floor
 

@@ -101,7 +101,7 @@ def test_a_noise_that_permits_a_large_error_of_the_model_is_no_moment(fitted, ex
     far = away * np.sqrt(excess * fitted.count / (near.total - fitted.total))
     beside = fit_at(fitted.problem, Point(common + far, fitted.point.per_run))
     assert (beside.total - fitted.total) / fitted.count == pytest.approx(excess, rel=0.2)
-    assert is_inflated(moment(1.0), beside) == inflated
+    assert is_inflated(moment(1.0), beside, fitted) == inflated
 
 
 @pytest.mark.parametrize(
