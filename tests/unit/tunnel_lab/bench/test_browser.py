@@ -269,10 +269,13 @@ def test_conditions_are_typed_pasted_checked_and_saved(browser: Any, served: Ben
     with tab(browser, served, "/typed/conditions") as one:
         page = one.page
         for key, text in (("wind_speed", "12"), ("spring_stiffness", "16")):
-            page.dblclick(f"[row-id=a] [col-id={key}]")
+            cell = f"[row-id=a] [col-id={key}]"
+            page.dblclick(cell)
+            page.wait_for_selector(f"{cell} input")  # a slow page would lose what is typed before
             page.keyboard.press("Control+a")
             page.keyboard.type(text)
             page.keyboard.press("Enter")
+            page.wait_for_selector(f"{cell}:has-text('{text}'):not(:has(input))")
         page.wait_for_selector("[row-id=a] [col-id=air_density].wrong")
         page.wait_for_selector("text=a: wind-on without air density")
         assert page.get_by_text("3 Identify").get_attribute("aria-disabled") == "true"
