@@ -14,7 +14,14 @@ from diagnosis.likelihood.residuals import linear_coefficients
 from diagnosis.likelihood.scatter_widths import ScatterColumns, width_prior
 from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.model.chance import Scatter
-from diagnosis.search.scatter import drifts, may_scatter, usual, with_deviations, without_deviations
+from diagnosis.search.scatter import (
+    drifts,
+    may_scatter,
+    may_show,
+    usual,
+    with_deviations,
+    without_deviations,
+)
 from identification.campaign.random_effects import (
     RunProducts,
     WidthPrior,
@@ -129,8 +136,8 @@ class ScatterLimits:
 
 _CENTRAL = (0.05, 0.5, 0.95)  # levels of the quantiles
 _AT_MOST = 0.95  # level of a limit
-_NUMBERS = 2  # number of a run's deviations: its frequency and its damping
-_FEWEST_COMPARED = 3  # minimum number of runs to be compared with each other
+_COMPARED = ("spring_stiffness", "mechanical_damping")  # a run's own deviations
+_NUMBERS = len(_COMPARED)  # number of a run's deviations
 _FEWEST = 5  # minimum number of runs for an outlier or a drift
 _FEWEST_OF_PATTERN = 4  # minimum number of runs for a pattern of the plan
 _PATTERN = 0.05  # relative range of a condition that makes a pattern
@@ -162,8 +169,9 @@ class RunDeviations:
             not finite.
         """
         own = {one.name: one for one in fitted.problem.scatter}
-        able = may_scatter(ALL_EFFECTS, fitted.problem.data)
-        if len(fitted.residuals) < _FEWEST_COMPARED or not able or not np.all(fitted.linear[:, 1:] != 0.0):
+        able, data = may_scatter(ALL_EFFECTS, fitted.problem.data), fitted.problem.data
+        compared = {kind.scatters for kind in may_show(ALL_EFFECTS, data)}
+        if not compared.issuperset(_COMPARED) or not np.all(fitted.linear[:, 1:] != 0.0):
             return None
         scatter = tuple(own.get(kind.name, usual(fitted, kind)) for kind in able)
         problem, point = with_deviations(*without_deviations(fitted), scatter)
@@ -192,7 +200,8 @@ class RunDeviations:
     def alone(self) -> tuple[int, int]:
         """Indices of the differences in a run's own stiffness and damping."""
         numbers = [one.kind.scatters for one in self.scatter]
-        return numbers.index("spring_stiffness"), numbers.index("mechanical_damping")
+        stiffness, damping = map(numbers.index, _COMPARED)
+        return stiffness, damping
 
     def spreads(self) -> tuple[Spread, ...]:
         """The differences of the fit with the intervals of their widths."""

@@ -322,17 +322,17 @@ def separation(first: Fit, second: Fit, run: RunData, angle: float) -> float | N
     one, other = _predict(first, run, angle), _predict(second, run, angle)
     if one is None or other is None:
         return None
-    left = max(1.0, min(1.0 + first.excess, 1.0 + second.excess))
+    dispersion = max(1.0, min(1.0 + first.excess, 1.0 + second.excess))
     missed = (
         _missed(one, _nearer(other, one, second, run), run),
         _missed(other, _nearer(one, other, first, run), run),
     )
-    return min(missed) / (run.noise.scale * float(np.sqrt(left)))
+    return min(missed) / (run.noise.scale * float(np.sqrt(dispersion)))
 
 
 @dataclass(frozen=True, eq=False)
 class _Prediction:
-    """A model's prediction of a run; behind the n readings, zeros for the priors of the run's deviations."""
+    """A model's prediction of a run; behind its n readings the run's deviations, over their priors."""
 
     reading: Array  # mean over the phases of its periodic effects, rad, shape (n + deviations,)
     waves: Array  # contributions of the cosine and the sine of each phase, rad, (n + deviations, 2 × effects)
@@ -387,7 +387,7 @@ def _nearer(rival: _Prediction, true: _Prediction, fit: Fit, run: RunData) -> _P
 
 
 def _onto(true: Array, rival: _Prediction, run: RunData) -> Array:
-    """Readings of the true model with zeros for the priors of the rival's deviations, in place of its own."""
+    """Readings of the true model, and behind them no deviations of the rival, in place of its own."""
     found = np.zeros((len(rival.reading), *true.shape[1:]))
     found[: run.reading.size] = true[: run.reading.size]
     return found

@@ -38,13 +38,19 @@ _IN_ORDER = 5  # minimum number of runs that show an order
 _TOLERANCE = 1e-7  # drop of χ², as a share of χ², at which the answer's fit has converged
 
 
-def may_scatter(kinds: Sequence[type[Effect]], data: Data) -> tuple[type[BetweenRuns], ...]:
-    """The differences that the runs could show, or that are stated: one or two runs have them, too.
+def may_show(kinds: Sequence[type[Effect]], data: Data) -> tuple[type[BetweenRuns], ...]:
+    """The differences that the runs could show: at least three runs have the quantity and a spring."""
+    return tuple(kind for kind in data.model.may_scatter(kinds) if data.acts(kind).sum() >= _FEWEST)
 
-    At least three runs with the quantity and a spring show them.
-    """
-    fewest = {kind: 1 if _stated(kind, data) > 0.0 else _FEWEST for kind in data.model.may_scatter(kinds)}
-    return tuple(kind for kind, least in fewest.items() if data.acts(kind).sum() >= least)
+
+def may_scatter(kinds: Sequence[type[Effect]], data: Data) -> tuple[type[BetweenRuns], ...]:
+    """The differences that the runs could show, and the stated ones that act in any run."""
+    shown = may_show(kinds, data)
+    return tuple(
+        kind
+        for kind in data.model.may_scatter(kinds)
+        if kind in shown or (_stated(kind, data) > 0.0 and data.acts(kind).any())
+    )
 
 
 def _stated(kind: type[BetweenRuns], data: Data) -> float:
@@ -109,9 +115,10 @@ def scattered(fitted: Fit, kinds: Sequence[type[Effect]]) -> Fit | None:
         fitted: a fit with the stated scatter.
         kinds: the effects that may be named.
     """
-    data, able = fitted.problem.data, may_scatter(kinds, fitted.problem.data)
-    if all(data.acts(kind).sum() < _FEWEST for kind in able):
+    data = fitted.problem.data
+    if not may_show(kinds, data):
         return None
+    able = may_scatter(kinds, data)
     scatter = tuple(usual(fitted, kind) for kind in able)
     problem, point = with_deviations(*without_deviations(fitted), scatter)
     jacobian = sensitivities(problem, point)
@@ -199,9 +206,9 @@ def shown_by(fitted: Fit) -> tuple[str, ...]:
     columns, prior = fitted.columns, width_prior(fitted.problem)
     if not _evident(columns, prior, np.ones(len(scatter), bool), chosen):
         return ()
-    shown, acts = _shown(columns, prior, chosen), fitted.problem.data.acts
-    enough = (acts(one.kind).sum() >= _FEWEST for one in scatter)
-    return tuple(one.name for one, *both in zip(scatter, shown, enough, strict=True) if all(both))
+    able = may_show([one.kind for one in scatter], fitted.problem.data)
+    shown = zip(scatter, _shown(columns, prior, chosen), strict=True)
+    return tuple(one.name for one, seen in shown if seen and one.kind in able)
 
 
 def _shown(columns: ScatterColumns, prior: WidthPrior, chosen: ScatterSettings) -> Kept:
