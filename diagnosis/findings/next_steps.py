@@ -18,6 +18,7 @@ from diagnosis.findings.spring_choices import choice_steps
 from diagnosis.findings.terms import CHANNELS, CONDITIONS, SCATTERS, without_scatter
 from diagnosis.findings.whole import Findings
 from diagnosis.search.answer import UNKNOWN
+from diagnosis.search.scatter import FEWEST_COMPARED
 from identification.printing import COEFFICIENTS
 from identification.show.numbers import listed, plain, relative_change, share, within
 from identification.show.quantity import Quantity
@@ -42,9 +43,8 @@ def steps(answer: Findings) -> list[NextStep]:
     if not causes and any(remark.withholds for remark in answer.remarks):
         return [*runs, NextStep("Diagnose again", "no coefficients are given until then")]
     if not causes:
-        use = NextStep("Use the coefficients as they are, within their intervals", "they need no correction")
         runs += model_steps(answer.model, answer)
-        return [*runs, *([use] if answer.coefficients.after else []), *_narrowing(answer)] or [_NOTHING]
+        return [*runs, *_using(answer), *_narrowing(answer)] or [_NOTHING]
     if answer.cycling:
         return runs or [
             NextStep(
@@ -71,6 +71,18 @@ _NOTHING = NextStep("Leave the rig as it is", "the model agrees with the runs")
 _NO_REPAIR = NextStep(
     "Do not repair the rig on this answer, and do not rely on the coefficients of any one cause"
 )
+
+
+def _using(answer: Findings) -> Iterator[NextStep]:
+    """The use of coefficients without a cause; too few runs do not show whether their intervals are wide enough."""
+    after = answer.coefficients.after
+    if not after:
+        return
+    if len(answer.gap.runs) >= FEWEST_COMPARED or any(one.shares.get("scatter") for one in after.values()):
+        yield NextStep("Use the coefficients as they are, within their intervals", "they need no correction")
+        return
+    yield NextStep("Repeat every run, at the same settings", "shows whether the runs repeat")
+    yield NextStep("Until then use the coefficients with care", "their intervals assume that the runs repeat")
 
 
 # ---- causes

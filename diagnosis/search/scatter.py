@@ -29,10 +29,12 @@ WIDTHS_SETTLED: Final = 1.0
 """Drop of −2 ln L above which a fit is repeated with new widths of the scatter, in χ². Convention. A smaller
 change is insignificant."""
 
+FEWEST_COMPARED: Final = 3
+"""Minimum number of runs that show whether runs repeat. Estimated. One difference gives a width to within a factor
+of 16 only."""
+
 _ROUNDS = 3  # rounds of widths and fits
 _REPEATING = 8  # iterations of a fit to runs that repeat, which starts close
-# minimum number of runs that may differ: one difference gives a width to within a factor of 16 only
-_FEWEST = 3
 _IN_ORDER = 5  # minimum number of runs that show an order
 
 _TOLERANCE = 1e-7  # drop of χ², as a share of χ², at which the answer's fit has converged
@@ -40,7 +42,7 @@ _TOLERANCE = 1e-7  # drop of χ², as a share of χ², at which the answer's fit
 
 def may_show(kinds: Sequence[type[Effect]], data: Data) -> tuple[type[BetweenRuns], ...]:
     """The differences that the runs could show: at least three runs have the quantity and a spring."""
-    return tuple(kind for kind in data.model.may_scatter(kinds) if data.acts(kind).sum() >= _FEWEST)
+    return tuple(kind for kind in data.model.may_scatter(kinds) if data.acts(kind).sum() >= FEWEST_COMPARED)
 
 
 def may_scatter(kinds: Sequence[type[Effect]], data: Data) -> tuple[type[BetweenRuns], ...]:

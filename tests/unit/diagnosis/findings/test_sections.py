@@ -315,6 +315,24 @@ def test_what_to_do_next(given: Document, changes: Document, words: list[str]) -
         assert part in step
 
 
+@pytest.mark.parametrize("scatter", [0.0, 0.2])
+def test_two_runs_do_not_show_whether_the_coefficients_may_be_used(given: Document, scatter: float) -> None:
+    """Unless the campaign states how far its runs differ: the intervals then allow for it."""
+    gap = given["gap"] | {"runs": given["gap"]["runs"][:2]}
+    after = {
+        name: one | ({"shares": {"scatter": scatter, "noise": 1.0 - scatter}} if scatter else {})
+        for name, one in given["coefficients"]["after"].items()
+    }
+    coefficients = given["coefficients"] | {"after": after}
+    steps = next_steps(findings_of(given | {"causes": [], "gap": gap, "coefficients": coefficients}))
+    if scatter:
+        assert steps[0].startswith("Use the coefficients as they are")
+    else:
+        assert [step.partition(":")[0] for step in steps] == [
+            "Repeat every run, at the same settings", "Until then use the coefficients with care",
+        ]  # fmt: skip
+
+
 def test_no_number_of_the_page_comes_from_elsewhere(given: Document, answer: Answer) -> None:
     """A number in any sentence is one of the document's, or of the records', in per cent or thousandths."""
     values = _all(given) | {float(x) for row in CONDITIONS for x in row if x is not None}
