@@ -94,7 +94,7 @@ def hidden_effects(fit: Fit, starts: Starts, residuals: Sequence[Array] | None =
     for kind, points in starts:
         sizes: list[tuple[_Size, StartingPoint]] = []
         with suppress(np.linalg.LinAlgError):
-            for start in second_order_starts(fit, kind) or points[: kind.tries]:
+            for start in second_order_starts(fit, kind, passive=True) or points[: kind.tries]:
                 one = _largest(fit, start, influence, reach)
                 sizes += [] if one is None else [(one, start)]
         sizes.sort(key=lambda one: -float(np.max(np.abs(one[0].moves))))

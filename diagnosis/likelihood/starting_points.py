@@ -263,16 +263,19 @@ def _tried(base: Fit, kind: type[Effect], trial: Trial) -> Problem:
     return dataclasses.replace(base.problem, effects=effects, fixed=fixed, free_forms=free_forms)
 
 
-def second_order_starts(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
-    """Starts of an effect with an absorbed first order, at the sizes of its passive trials, whatever the readings.
+def second_order_starts(base: Fit, kind: type[Effect], *, passive: bool) -> list[StartingPoint]:
+    """Starts of an effect with an absorbed first order, at the sizes of its trials, whatever the readings.
 
     Empty for other effects, and where the runs cannot show it.
+
+    Args:
+        passive: whether only the passive trials count.
     """
     found: list[StartingPoint] = []
     if not base.problem.data.may_show(kind):
         return found
     for trial in kind.trials(_circumstances(base)):
-        if trial.second_order and trial.passive and trial.scaled is not None:
+        if trial.second_order and trial.passive >= passive and trial.scaled is not None:
             problem = dataclasses.replace(base.problem, effects=(*base.problem.effects, kind))
             own = _own_parameters(problem, kind)
             sizes = np.array([trial.values.get(info.name, info.default) for info in own])

@@ -9,7 +9,12 @@ import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, try_fit
 from diagnosis.likelihood.residuals import gap_left, misfit
-from diagnosis.likelihood.starting_points import StartingPoint, misses_motion, starting_points
+from diagnosis.likelihood.starting_points import (
+    StartingPoint,
+    misses_motion,
+    second_order_starts,
+    starting_points,
+)
 from diagnosis.search.clock import Progress
 from diagnosis.search.hypothesis import Hypothesis, is_plausible, of_more_weight, own_gain, turned_back
 from diagnosis.search.scatter import likelier, with_likeliest_widths, with_own_linear_terms
@@ -79,8 +84,9 @@ def sets_with_one_more(
                 progress(" + ".join((*parent.effects, kind.name)))
             starts = starts[: kind.tries]
             tried = [fitted for start in starts if (fitted := _fitted(start, base)) is not None]
-            if all(fitted.total > base.total for fitted in tried):  # linear theory overshot
+            if all(fitted.unlikelihood > base.unlikelihood for fitted in tried):  # linear theory failed
                 near = [point for start in starts if (point := start.nearer()) is not None]
+                near += second_order_starts(base, kind, passive=False)
                 tried += [fitted for start in near if (fitted := _fitted(start, base)) is not None]
             there = filter(is_plausible, map(turned_back, tried))
             best = min(there, key=lambda fitted: fitted.unlikelihood, default=None)

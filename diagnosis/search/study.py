@@ -270,7 +270,7 @@ def _with_fits(answer: Answer, sets: Sets, whole: Mapping[Names, Hypothesis | No
 def _excused(sets: Sets, test: GapTest) -> Sequence[Answer]:
     """The answers; if noise explains the gap, only the causes detected in the records, or ``none``."""
     weighed, prepared = sets.weighed, sets.view.prepared
-    if not sets.view.may_be_noise or not noise_explains(prepared.nominal, test, weighed):
+    if not sets.view.may_be_noise or not noise_explains(sets.view.repeating, test, weighed):
         return weighed
     answer = Answer((), 1.0, 1.0) if prepared.read_off else Answer(UNKNOWN, 1.0, 1.0)
     others = [replace(w, probability=0.0) for w in weighed if w.effects not in ((), UNKNOWN)]
