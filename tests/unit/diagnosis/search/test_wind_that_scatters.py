@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -14,12 +15,14 @@ from diagnosis.likelihood.scatter_widths import width_prior
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model import chance
 from diagnosis.model.parameters import Point
+from diagnosis.search import one_more
 from diagnosis.search.hypothesis import Hypothesis
-from diagnosis.search.investigate import nominal_study
+from diagnosis.search.investigate import investigate, nominal_study
 from diagnosis.search.one_more import LEAST_DROP, sets_with_one_more
-from diagnosis.search.scatter import scattered
+from diagnosis.search.scatter import scattered, with_likeliest_widths
 from tunnel_sim.effects import effect_class, known_effects
 from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.vocabulary.between_runs import Repeatability
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
 
@@ -141,6 +144,34 @@ def test_a_lead_is_tried_beside_another_effect_though_linear_theory_predicts_lit
     (child,) = sets_with_one_more([Hypothesis(("sensor_nonlinearity",), base)], [lag])
     assert base.unlikelihood - child.fit.unlikelihood > 1.2 * start.predicted_drop
     assert abs(child.fit.value("unsteady_aero_lag.lag") + 0.3) < 3.0 * child.fit.std("unsteady_aero_lag.lag")
+
+
+def test_a_fit_worse_than_without_the_effect_starts_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From a lag the fit ends in wide deviations, beside which the lead remains invisible."""
+    base = scattered(nominal_study(blown(lead=0.45), known_effects()).prepared.nominal, known_effects())
+    assert base is not None
+    lag = effect_class("unsteady_aero_lag")
+    (good,) = starting_points(base, lag)
+    bad = replace(good, point=Point(np.append(base.point.common, 0.4), base.point.per_run))
+    fitted = try_fit(bad.problem, bad.point, base=base, max_iterations=12)
+    assert fitted is not None
+    assert with_likeliest_widths(fitted, rounds=1).unlikelihood > base.unlikelihood
+    monkeypatch.setattr(one_more, "starting_points", lambda *_: [bad])
+    (child,) = sets_with_one_more([Hypothesis((), base)], [lag])
+    assert base.unlikelihood - child.fit.unlikelihood > 90.0
+    assert abs(child.fit.value("unsteady_aero_lag.lag") + 0.45) < 3.0 * child.fit.std("unsteady_aero_lag.lag")
+
+
+@pytest.mark.parametrize("stated", [0.4 * SCATTER, 2.0 * SCATTER])
+def test_runs_that_differ_by_more_than_stated_are_not_noise(stated: float) -> None:
+    """The stated deviations take up the mean square, though they are improbably large."""
+    sensor = SensorProperties(RATE, noise_std=NOISE)
+    campaign = replace(blown(), sensor=sensor, repeatability=Repeatability(wind_speed=stated))
+    names = ("wind_speed_scatter", "stiffness_scatter", "damping_scatter", "sensor_drift")
+    study = investigate(campaign, [effect_class(name) for name in names])
+    beyond = stated < SCATTER
+    assert study.gap.test.detected is beyond
+    assert study.causes == ("wind_speed_scatter",) * beyond
 
 
 def test_which_effects_only_the_comparison_of_runs_shows() -> None:
