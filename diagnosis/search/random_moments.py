@@ -266,7 +266,7 @@ def _shows(source: MomentSource, fitted: Fit, kinds: Sequence[type[Effect]]) -> 
 def _is_random(
     process: ProcessNoise, source: MomentSource, fitted: Fit, kinds: Sequence[type[Effect]]
 ) -> bool:
-    """Whether a residual is neither noise of the reading nor slow, follows no phase or law, and is not inflated.
+    """Whether a residual is neither noise of the reading, a line nor slow, follows no phase or law, and is not inflated.
 
     Args:
         process: the moment in the residual.
@@ -282,8 +282,9 @@ def _is_random(
         return True
     # the point beside a strong moment misses the runs by a spring and a damping, which are slow
     remaining = likeliest(random_moments(least, source), fitted.settings.moment)
-    slow = remaining is None or is_slow(least, remaining, source, kinds)
-    return not slow and not is_inflated(process, fitted, least)
+    if remaining is None or is_a_line(least, remaining) or is_slow(least, remaining, source, kinds):
+        return False
+    return not is_inflated(process, fitted, least)
 
 
 def is_inflated(process: ProcessNoise, fitted: Fit, least: Fit) -> bool:
