@@ -266,7 +266,7 @@ def _shows(source: MomentSource, fitted: Fit, kinds: Sequence[type[Effect]]) -> 
 def _is_random(
     process: ProcessNoise, source: MomentSource, fitted: Fit, kinds: Sequence[type[Effect]]
 ) -> bool:
-    """Whether a residual is neither noise of the reading, a line nor slow, follows no phase or law, and is not inflated.
+    """Whether a residual is neither noise of the reading nor a line, not slow or inflated, and follows no phase or law.
 
     Args:
         process: the moment in the residual.

@@ -32,7 +32,7 @@ FADING: Final = 1.5
 fades with the motion. Judgement. The rest of a motion that a model misses decays with it; the surroundings and the
 wind do not know when a run began. Real turbulence is not exactly stationary."""
 STEADY_LINE_SHARE: Final = 0.75
-"""Share of the residual explained by a line with an amplitude and a phase per run, above which the moment is a line.
+"""Share of the residual explained by a line with an amplitude and a phase per run, above which the moment is none.
 Judgement (decision 0046). A line explains at most 0.66 of sixteen drawn moments of the stream, and 0.73 to 1.1 of a
 mode of the mount at 1.05 to 1.3 times the frequency of the motion."""
 

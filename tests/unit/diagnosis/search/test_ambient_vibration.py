@@ -298,11 +298,13 @@ def test_a_motion_that_the_model_misses_fades_and_is_no_random_moment() -> None:
     assert not is_steady_noise(process, Settings().moment)
 
 
-def test_a_steady_line_is_no_random_moment() -> None:
-    """Truth: a platform that vibrates at one frequency, with a phase of its own in every run."""
+@pytest.mark.parametrize("decay", [0.0, 0.3])
+def test_a_line_is_no_random_moment(decay: float) -> None:
+    """Truth: a platform that vibrates at one frequency, each run with its own phase; steadily, or from the release."""
     rng, runs, data = np.random.default_rng(9), [], of(STILL)
     for run in data.runs:
-        line = 1e-3 * np.sin(2.0 * np.pi * (7.0 * run.record.time_s + rng.uniform()))
+        time, size = run.record.time_s, 1e-3 if decay == 0.0 else rng.uniform(1e-3, 4e-3)
+        line = size * np.exp(-decay * time) * np.sin(2.0 * np.pi * (7.0 * time + rng.uniform()))
         runs.append(replace(run, record=Record(run.record.time_s, run.record.yaw_rad + line)))
     base = nominal(replace(data, runs=tuple(runs)))
     process = min(random_moments(base, SURROUNDINGS), key=lambda one: one.cost)
