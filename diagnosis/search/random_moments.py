@@ -266,7 +266,7 @@ def _shows(source: MomentSource, fitted: Fit, kinds: Sequence[type[Effect]]) -> 
 def _is_random(
     process: ProcessNoise, source: MomentSource, fitted: Fit, kinds: Sequence[type[Effect]]
 ) -> bool:
-    """Whether a residual is neither noise of the reading nor a line, not slow or inflated, and follows no phase or law.
+    """Whether a residual is no noise of the reading, no line, not slow, not inflated, and follows no phase or law.
 
     Args:
         process: the moment in the residual.

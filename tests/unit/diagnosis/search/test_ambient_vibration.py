@@ -300,7 +300,7 @@ def test_a_motion_that_the_model_misses_fades_and_is_no_random_moment() -> None:
 
 @pytest.mark.parametrize("decay", [0.0, 0.3])
 def test_a_line_is_no_random_moment(decay: float) -> None:
-    """Truth: a platform that vibrates at one frequency, each run with its own phase; steadily, or from the release."""
+    """Truth: a platform that vibrates at one frequency, in every run with its own phase; or a mode that decays."""
     rng, runs, data = np.random.default_rng(9), [], of(STILL)
     for run in data.runs:
         time, size = run.record.time_s, 1e-3 if decay == 0.0 else rng.uniform(1e-3, 4e-3)
