@@ -16,6 +16,7 @@ from diagnosis.likelihood.other_minima import deepest
 from diagnosis.likelihood.part_of_fit import sought_again
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, linear_coefficients, misfit, resonance
+from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
 from diagnosis.search.process_noise import MomentLayer
 from diagnosis.search.weights import FittedSet, least_excess, log_weight, misfit_scale
@@ -256,12 +257,19 @@ def is_plausible(fitted: Fit) -> bool:
     ]
     if any(name in problem.names and fitted.bound(name) for name in inside):
         return False
-    motions = [
-        (2.0 * np.pi * resonance(fitted, i), run.duration) for i, run in enumerate(fitted.problem.data.runs)
-    ]
+    runs = problem.data.runs
+    motions = [(2.0 * np.pi * resonance(fitted, place), run.duration) for place, run in enumerate(runs)]
+    readings = extremes(problem.data)
     return all(
-        np.mean([effect.plausible(omega, duration) for omega, duration in motions]) >= PLAUSIBLE_RUNS
+        np.mean([effect.plausible(*motion, readings) for motion in motions]) >= PLAUSIBLE_RUNS
         for effect in effects
+    )
+
+
+def extremes(data: Data) -> tuple[float, float]:
+    """The least and the greatest reading of a campaign."""
+    return min(float(run.reading.min()) for run in data.runs), max(
+        float(run.reading.max()) for run in data.runs
     )
 
 
@@ -274,8 +282,8 @@ def turned_back(fitted: Fit) -> Fit:
         If the zero is outside the readings, the fit that starts half a turn nearer, provided that it explains
         them as well; else the given fit.
     """
-    problem, readings = fitted.problem, [run.reading for run in fitted.problem.data.runs]
-    least, greatest = min(float(r.min()) for r in readings), max(float(r.max()) for r in readings)
+    problem = fitted.problem
+    least, greatest = extremes(problem.data)
     signs = [f"{kind.name}.{kind.turns}" for kind in problem.effects if kind.turns]
     if not signs or "zero" not in problem.names or least <= fitted.value("zero") <= greatest:
         return fitted

@@ -143,7 +143,7 @@ class ActuatorLag(ActuatorEffect):
         scale=0.002, lower=0.0, upper=10.0, fit_upper=1.0,
     )  # fmt: skip
 
-    def plausible(self, omega: float, duration: float) -> bool:
+    def plausible(self, omega: float, duration: float, readings: tuple[float, float]) -> bool:
         """Whether the lag is more than a delay between input and motion: at least as slow as `_SLOW`."""
-        del duration
+        del duration, readings
         return self.lag * omega > _SLOW

@@ -145,6 +145,7 @@ class SensorDrift(ReadingEffect):
 
 
 _FAR = 2.0  # rad: the other limit, if only one side clips
+_FLATTENED = 0.1  # least drop of the sensor's sensitivity at the greatest reading
 
 
 @dataclass(frozen=True)
@@ -185,6 +186,17 @@ class SensorClipping(ReadingEffect):
             for side in (-1.0, 1.0)
         ]
         return [*both, *one]
+
+    def plausible(self, omega: float, duration: float, readings: tuple[float, float]) -> bool:
+        """Whether the greatest reading is flattened; the sensor is nonlinear otherwise.
+
+        A hard limit is reached, as a fit would leave it otherwise.
+        """
+        del omega, duration
+        if self.is_null or self.knee == 0.0:
+            return True
+        room = self.knee * self.limit
+        return max(abs(one - self.centre) for one in readings) > self.limit - room + _FLATTENED * room
 
     def on_reading(self, reading: Array) -> Array:
         """Clip at the limit, or saturate gradually."""
@@ -404,11 +416,12 @@ class SecondMode(SecondOscillation):
         """The ringing from the release on, and the oscillation excited by the input."""
         return (residuals.ringing(), residuals.excited())
 
-    def plausible(self, omega: float, duration: float) -> bool:
+    def plausible(self, omega: float, duration: float, readings: tuple[float, float]) -> bool:
         """Whether the oscillation is separate from the motion, with three cycles in the record.
 
         It must decay, but not within three cycles; beat with the motion; and not be as slow as a drift.
         """
+        del readings
         decays = self.damping_ratio > _DECAYS * _LEAST_DAMPING
         lasts = 2.0 * np.pi * self.damping_ratio * _LEAST_CYCLES < 1.0
         lasting = min(duration, 1.0 / max(self.damping_ratio * self.frequency, 1e-300))

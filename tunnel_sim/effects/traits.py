@@ -209,17 +209,18 @@ class Traits:
         del values
         return stiffness, damping
 
-    def plausible(self, omega: float, duration: float) -> bool:
-        """Whether a fitted effect still deserves its name, and a record is long enough to show it.
+    def plausible(self, omega: float, duration: float, readings: tuple[float, float]) -> bool:
+        """Whether a fitted effect still deserves its name, and a record can show it.
 
         Args:
             omega: angular frequency of the motion, rad/s.
             duration: duration of the record, s.
+            readings: least and greatest reading of the campaign, in the unit of the reading.
 
         Returns:
-            False if its parameters make it part of the motion itself.
+            False if its parameters make it part of the motion itself, or another effect.
         """
-        del omega, duration
+        del omega, duration, readings
         return True
 
     def alike(self) -> Sequence[Trial]:

@@ -98,7 +98,7 @@ def test_an_effect_that_shows_fewer_than_three_cycles_is_not_a_second_mode(
 ):
     given = {"amplitude": 0.01, "frequency": frequency, "damping_ratio": damping}
     mode = effect_from("second_mode", given)
-    assert mode.plausible(13.0, duration) == shown
+    assert mode.plausible(13.0, duration, (-0.3, 0.3)) == shown
 
 
 def test_a_second_mode_is_said_only_where_it_may_be_named():

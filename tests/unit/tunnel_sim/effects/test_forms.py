@@ -102,6 +102,16 @@ def test_a_soft_limit_bends_over_without_a_kink() -> None:
     assert np.max(np.abs(curved)) < limit
 
 
+@pytest.mark.parametrize(
+    ("limit", "knee", "flat"), [(0.2, 0.25, True), (0.21, 0.25, False), (1.3, 0.8, False), (1.3, 0.0, True)]
+)
+def test_a_soft_limit_flattens_the_greatest_reading(limit: float, knee: float, flat: bool) -> None:
+    """By a tenth beyond 0.155 and 0.163 rad from the centre; the third limit bends all readings alike."""
+    clipping = effect_from("sensor_clipping", {"limit": limit, "centre": 0.01, "knee": knee})
+    assert clipping.plausible(12.0, 60.0, (-0.15, 0.16)) == flat
+    assert clipping.plausible(12.0, 60.0, (-0.14, 0.1)) == (knee == 0.0)
+
+
 def test_rounded_backlash_is_the_mean_of_two_plays() -> None:
     wide, narrow = (read("sensor_hysteresis", half_width=w) for w in (0.013, 0.007))
     assert read("sensor_hysteresis", half_width=0.01, roundness=0.3) == pytest.approx(0.5 * (wide + narrow))
