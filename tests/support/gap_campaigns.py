@@ -35,6 +35,8 @@ INTERVAL = 4e-3
 DURATION = 10.0
 NOISE = 4e-4
 CONDITIONS = tuple((spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 15.0, 25.0))
+FOUR = ((16.12, 0.0), (16.12, 25.0), (44.84, 0.0), (44.84, 15.0))
+"""Two springs and two wind speeds, which tell turbulence from vortices and from the surroundings."""
 INERTIA, DAMPING, CN_BETA, CN_R = 0.11, 0.008, 0.45, -0.25
 
 

@@ -30,6 +30,7 @@ from tests.support.gap_campaigns import (
     CONDITIONS,
     DAMPING,
     DURATION,
+    FOUR,
     INERTIA,
     INTERVAL,
     added,
@@ -47,6 +48,10 @@ BUFFETING = (effect_class("buffeting"),)
 BOTH = (*BUFFETING, effect_class("vortex_shedding"))
 
 
+def four_runs(*effects):
+    return campaign(*effects, conditions=FOUR)
+
+
 def moment_of(answer: Hypothesis) -> MomentLayer:
     assert answer.moment is not None
     return answer.moment
@@ -60,9 +65,9 @@ def buffeted(data, intensity, bandwidth, seed=5):
     """A first-order random moment on every wind-on run, sampled exactly: the nominal model is linear."""
     rng = np.random.default_rng(seed)
     runs = []
-    for run, (spring, speed) in zip(data.runs, CONDITIONS, strict=True):
-        if speed > 0.0:
-            response = random_response(rng, spring, speed, intensity, bandwidth)
+    for run in data.runs:
+        if run.wind_on:
+            response = random_response(rng, run.spring_stiffness, run.wind_speed, intensity, bandwidth)
             run = replace(run, record=Record(run.record.time_s, run.record.yaw_rad + response))
         runs.append(run)
     return replace(data, runs=tuple(runs))
@@ -100,7 +105,7 @@ def fit_wandering_shedding(base):
 
 @pytest.fixture(scope="module")
 def windy():
-    return nominal(buffeted(campaign(), 0.01, 4.0))
+    return nominal(buffeted(four_runs(), 0.01, 4.0))
 
 
 @pytest.fixture(scope="module")
@@ -123,7 +128,7 @@ def test_intensity_and_bandwidth_are_recovered(found):
 def test_innovations_of_the_right_model_are_white_and_steady(found):
     assert departure_from_white(found) < 5.0
     assert bursts(found, 0.001) < 1.0
-    assert len(found.innovations) == sum(speed > 0.0 for _, speed in CONDITIONS)
+    assert len(found.innovations) == sum(speed > 0.0 for _, speed in FOUR)
 
 
 @pytest.mark.parametrize("length", [1, 4, 16, 60])
@@ -160,7 +165,7 @@ def test_turbulence_in_one_run_is_not_that_of_the_stream(found):
 
 
 def test_without_a_random_moment_there_is_nothing_to_gain():
-    found = fit_turbulence(nominal(campaign()))
+    found = fit_turbulence(nominal(four_runs()))
     assert found is not None
     assert found.drop < 20.0  # χ² of two parameters, fitted over a grid
 
@@ -168,15 +173,15 @@ def test_without_a_random_moment_there_is_nothing_to_gain():
 def deflected(data, coefficient):
     """Every wind-on run about the angle where the spring holds a steady moment, as a misaligned flow has it."""
     runs = []
-    for run, (spring, speed) in zip(data.runs, CONDITIONS, strict=True):
-        pressure = 0.5 * 1.2 * speed**2 * AREA * LENGTH
-        angle = pressure * coefficient / (spring - pressure * CN_BETA)
+    for run in data.runs:
+        pressure = 0.5 * 1.2 * run.wind_speed**2 * AREA * LENGTH
+        angle = pressure * coefficient / (run.spring_stiffness - pressure * CN_BETA)
         runs.append(replace(run, record=Record(run.record.time_s, run.record.yaw_rad + angle)))
     return replace(data, runs=tuple(runs))
 
 
 def test_a_law_that_is_missing_is_no_random_moment(monkeypatch):
-    base = nominal(deflected(campaign(), 0.005))
+    base = nominal(deflected(four_runs(), 0.005))
     assert obeys_a_law(base, STREAM)
     assert is_no_noise(base)  # so that none is even sought
     for guard in ("obeys_a_law", "is_no_noise", "is_slow"):  # each run rests at its own angle, which is slow
@@ -188,7 +193,7 @@ def test_a_law_that_is_missing_is_no_random_moment(monkeypatch):
 @pytest.mark.parametrize("bandwidth", [slow(0.05), slow(0.5), 10.0])
 def test_a_random_moment_obeys_no_law(bandwidth):
     for seed in range(2):
-        blown = nominal(buffeted(campaign(), 0.01, bandwidth, seed))
+        blown = nominal(buffeted(four_runs(), 0.01, bandwidth, seed))
         assert not obeys_a_law(blown, STREAM)
         assert not is_no_noise(blown)
 
@@ -201,7 +206,7 @@ def test_buffeting_is_offered_where_it_blows(windy):
 
 def test_turbulence_is_not_called_vortices_where_buffeting_is_excluded():
     """A narrow spectrum that follows the wind takes up turbulence too; the broad one explains it better."""
-    base = nominal(buffeted(campaign(), 0.002, 1.0))
+    base = nominal(buffeted(four_runs(), 0.002, 1.0))
     narrow = fit_wandering_shedding(base)
     assert narrow is not None
     assert narrow.drop > Settings().moment.acts_from
@@ -220,7 +225,7 @@ def test_weak_turbulence_is_seen_beside_a_spring_that_closes_all_but_a_hundredth
 
 def test_a_rival_beside_turbulence_is_an_answer_as_well():
     strong = effect_from("cubic_stiffness", {"coefficient": -0.2})
-    base = nominal(buffeted(campaign(strong), 0.0012, 4.0))
+    base = nominal(buffeted(four_runs(strong), 0.0012, 4.0))
     (start, *_) = starting_points(base, type(strong))
     spring = Hypothesis(("cubic_stiffness",), fit(start.problem, start.point, base=base))
     view = whole_runs(base, (*BUFFETING, type(strong), OwnCubic, effect_class("coulomb_friction")))
@@ -288,11 +293,11 @@ def test_turbulence_that_is_slowly_forgotten_can_be_noise(windy):
 
 
 def test_one_gust_is_no_buffeting():
-    struck = with_blow(campaign(), 0.01, 5.5)
+    struck = with_blow(four_runs(), 0.01, 5.5)
     struck = replace(
         struck,
         runs=tuple(
-            b if b.wind_on else a for a, b in zip(campaign().runs, struck.runs, strict=True)
+            b if b.wind_on else a for a, b in zip(four_runs().runs, struck.runs, strict=True)
         ),
     )  # fmt: skip
     assert weigh_random_moments(whole_runs(nominal(struck), BOTH), []) == []
@@ -325,13 +330,13 @@ def test_an_effect_that_growth_misses_in_the_first_noise_is_added_in_the_next(mo
         return [Hypothesis((DRIFT.name,), fit(point.problem, point.point))]
 
     monkeypatch.setattr(random_moments, "grow", grown)
-    kinds, drifting = (*BUFFETING, type(SPRING)), nominal(buffeted(campaign(DRIFT, SPRING), 0.003, 3.0))
+    kinds, drifting = (*BUFFETING, type(SPRING)), nominal(buffeted(four_runs(DRIFT, SPRING), 0.003, 3.0))
     (answer,) = weigh_random_moments(whole_runs(drifting, kinds), [])
     assert answer.names == ("buffeting", "cubic_stiffness", "sensor_drift")
 
 
 def test_a_gap_in_still_air_is_no_buffeting():
-    fit = nominal(campaign(effect_from("quadratic_damping", {"coefficient": 0.003})))
+    fit = nominal(four_runs(effect_from("quadratic_damping", {"coefficient": 0.003})))
     assert excess_elsewhere(fit, fit_turbulence(fit).runs) > 0.1
     assert weigh_random_moments(whole_runs(fit, BOTH), []) == []
 
@@ -352,10 +357,14 @@ def test_runs_without_wind_have_no_random_moment():
 def with_moment(data, moment):
     """A moment coefficient added to every wind-on run: ``moment(time, speed)`` at 2 kHz, held over its samples."""
     runs = []
-    for run, (spring, speed) in zip(data.runs, CONDITIONS, strict=True):
-        if speed > 0.0:
+    for run in data.runs:
+        if run.wind_on:
+            speed = run.wind_speed
             pressure = 0.5 * 1.2 * speed**2 * AREA * LENGTH
-            stiffness, damping = spring - pressure * CN_BETA, DAMPING - pressure * LENGTH / speed * CN_R
+            stiffness, damping = (
+                run.spring_stiffness - pressure * CN_BETA,
+                DAMPING - pressure * LENGTH / speed * CN_R,
+            )
             time = np.arange(2 * round(DURATION / INTERVAL)) * INTERVAL / 2
             given = pressure * moment(time, speed)
             angle = response(given, INTERVAL / 2, INERTIA, damping, stiffness)[::2]
@@ -377,7 +386,7 @@ def wandering_vortices(strouhal, amplitude, seed):
 
 def test_vortices_whose_phase_wanders_are_shedding_and_not_turbulence():
     strouhal = 0.15
-    fit = nominal(with_moment(campaign(), wandering_vortices(strouhal, 0.05, seed=8)))
+    fit = nominal(with_moment(four_runs(), wandering_vortices(strouhal, 0.05, seed=8)))
     found = fit_wandering_shedding(fit)
     assert found is not None
     assert found.spectrum[0].strouhal_number == pytest.approx(strouhal, rel=0.01)
@@ -423,7 +432,7 @@ def test_turbulence_and_vortices_at_once_are_one_spectrum_with_two_parts():
 
 def test_the_covariance_of_two_parts_is_that_of_independent_moments():
     """From rest both responses add; compared at one spectrum whose parts are equal to twice its power."""
-    fit = nominal(buffeted(campaign(), 0.01, 4.0))
+    fit = nominal(buffeted(four_runs(), 0.01, 4.0))
     one, two = SpectrumPart(0.01 * np.sqrt(2.0), 4.0), SpectrumPart(0.01, 4.0)
     whole, halves = with_response(fit, (one,)), with_response(fit, (two, two))
     for run, other in zip(whole.runs, halves.runs, strict=True):
@@ -432,7 +441,7 @@ def test_the_covariance_of_two_parts_is_that_of_independent_moments():
 
 def test_vortices_beside_a_slow_error_of_one_run_have_one_part(monkeypatch):
     """A second part would take the error up, and be named turbulence; it shows in too few runs."""
-    data = with_moment(campaign(), wandering_vortices(0.15, 0.05, seed=8))
+    data = with_moment(four_runs(), wandering_vortices(0.15, 0.05, seed=8))
     *others, last = data.runs
     creeping = 4e-4 * last.record.time_s / last.record.time_s[-1]  # rad
     last = replace(last, record=Record(last.record.time_s, last.record.yaw_rad + creeping))
@@ -480,7 +489,7 @@ def about_a_frequency(bandwidth, centre):
 
 
 def test_turbulence_about_a_frequency_is_recovered():
-    fit = nominal(with_moment(campaign(), about_a_frequency(0.8, 5.0)))
+    fit = nominal(with_moment(four_runs(), about_a_frequency(0.8, 5.0)))
     broad, centred = fit_turbulence(fit), fit_turbulence(fit, centred=True)
     assert broad is not None
     assert centred is not None
@@ -490,7 +499,7 @@ def test_turbulence_about_a_frequency_is_recovered():
 
 def test_an_effect_that_is_not_evident_beside_a_random_moment_goes():
     """Vortices have a phase in every run, so they fit some of any random motion; the friction is there."""
-    known = campaign(effect_from("coulomb_friction", {"friction_moment": 0.004}))
+    known = four_runs(effect_from("coulomb_friction", {"friction_moment": 0.004}))
     base = nominal(buffeted(known, 3e-3, 1.0))
     noisy = replace(base.problem, data=with_response(base, (SpectrumPart(3e-3, 1.0, source=STREAM),)))
     fitted = added(fit(noisy, base.point), "coulomb_friction", "vortex_shedding")
