@@ -12,6 +12,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from diagnosis import diagnose, vocabulary
+from diagnosis.compose import Confirmed
 from diagnosis.findings.next_run import separation
 from diagnosis.search.clock import StepClock
 from diagnosis.search.investigate import investigate, nominal_study
@@ -54,6 +55,7 @@ def campaign(
     drift: float = 0.0,
     cubic: float = 0.0,
     repeatability: Repeatability | None = None,
+    duration: float = 5.0,
 ) -> Campaign:
     """Decays in closed form or by SciPy's integrator, whose springs and dampers differ from run to run.
 
@@ -61,13 +63,15 @@ def campaign(
         scatter: factor on the standard deviations.
         drift: relative change of the damping from the first to the last run.
         cubic: κ of a hardening spring, 1/rad².
+        duration: of a run, s.
     """
-    rng, time = np.random.default_rng(52), np.arange(0.0, 8.0, 1.0 / RATE)
+    rng, time = np.random.default_rng(56), np.arange(0.0, duration, 1.0 / RATE)
+    differences = rng.standard_normal((len(SPRINGS), 2))
     order = np.linspace(-0.5, 0.5, len(SPRINGS))
     runs = []
-    for number, stiffness in enumerate(SPRINGS):
-        spring = stiffness * (1.0 + scatter * SPRING * rng.standard_normal())
-        damper = DAMPING * (1.0 + scatter * DAMPER * rng.standard_normal() + drift * order[number])
+    for number, (stiffness, (of_spring, of_damper)) in enumerate(zip(SPRINGS, differences, strict=True)):
+        spring = stiffness * (1.0 + scatter * SPRING * of_spring)
+        damper = DAMPING * (1.0 + scatter * DAMPER * of_damper + drift * order[number])
 
         def rates(_: float, y: np.ndarray, k: float = spring, c: float = damper) -> list[float]:
             return [y[1], -(k * (y[0] + cubic * y[0] ** 3) + c * y[1]) / INERTIA]
@@ -83,20 +87,20 @@ def campaign(
     )
 
 
+@cache
+def studied(*, scatter: float = 1.0, cubic: float = 0.0, kinds: Sequence[type[Effect]] = FEW) -> Study:
+    return investigate(campaign(scatter=scatter, cubic=cubic), kinds)
+
+
 @pytest.mark.parametrize("kinds", [FEW, slow(ALL_EFFECTS)])
 def test_scatter_alone_is_named_with_its_size_and_nothing_else(kinds: Sequence[type[Effect]]) -> None:
-    found = diagnose(campaign(), kinds=kinds)
-    assert set(found.causes) == {STIFFNESS, DAMPED}
-    assert found.repeatability is not None
-    for spread in found.repeatability.spreads:
+    found = Confirmed.of(studied(kinds=kinds))
+    assert set(found.study.causes) == {STIFFNESS, DAMPED}
+    assert found.repeats is not None
+    for spread in found.repeats.spreads:
         width = {STIFFNESS: SPRING, DAMPED: DAMPER}[spread.effect]
         assert spread.interval[0] < width < spread.interval[1]
         assert 1.0 / 2.5 < spread.width / width < 2.5  # eight runs tell a standard deviation to a quarter
-
-
-@cache
-def studied(*, scatter: float = 1.0, cubic: float = 0.0) -> Study:
-    return investigate(campaign(scatter=scatter, cubic=cubic), FEW)
 
 
 def test_scatter_hides_no_cause() -> None:
@@ -143,7 +147,7 @@ def test_an_effect_that_does_what_the_scatter_does_is_left_out() -> None:
 
 def test_two_patterns_in_one_number_are_not_chance() -> None:
     """Beside what a dependence on the speed leaves, a wrong spring looks like chance, and the reverse."""
-    rng, time, runs = np.random.default_rng(8), np.arange(0.0, 10.0, 1.0 / RATE), []
+    rng, time, runs = np.random.default_rng(8), np.arange(0.0, 6.0, 1.0 / RATE), []
     speeds, springs = (0.0, 12.0, 17.0, 25.0), (16.0, 30.0, 44.0)
     mean, air = float(np.mean(speeds[1:])), 0.5 * 1.2 * 0.036 * 0.625
     for spring, speed in product(springs, speeds):
@@ -165,10 +169,10 @@ def test_two_patterns_in_one_number_are_not_chance() -> None:
 
 
 def test_runs_that_repeat_show_none() -> None:
-    found = diagnose(campaign(scatter=0.0), kinds=FEW)
-    assert found.causes == ()
-    assert found.repeatability is not None
-    assert found.repeatability.spreads == ()
+    found = Confirmed.of(studied(scatter=0.0))
+    assert found.study.causes == ()
+    assert found.repeats is not None
+    assert found.repeats.spreads == ()
 
 
 def test_stated_scatter_is_no_gap_but_more_than_that_is() -> None:
@@ -187,7 +191,7 @@ def test_two_runs_have_the_stated_scatter_that_they_cannot_show() -> None:
     stds = []
     known = Repeatability(spring_stiffness=SPRING, mechanical_damping=DAMPER)
     for scatter, stated in ((1.0, known), (0.0, None)):
-        several = campaign(scatter=scatter, cubic=0.1, repeatability=stated)
+        several = campaign(scatter=scatter, cubic=0.1, repeatability=stated, duration=8.0)
         study = investigate(replace(several, runs=several.runs[:2]), FEW)
         assert study.fitted == ("cubic_stiffness",)
         stds.append(study.similarity.own(study.chosen.std("yaw_inertia"), "kg m2"))
@@ -224,7 +228,7 @@ def test_what_follows_the_order_of_the_runs_is_no_scatter() -> None:
 
 def test_a_run_far_beyond_the_others_is_an_outlier() -> None:
     runs = campaign()
-    faulty = campaign(scatter=40.0).runs[4]
+    faulty = campaign(scatter=25.0).runs[4]
     changed = tuple(faulty if run.id == faulty.id else run for run in runs.runs)
     found = diagnose(replace(runs, runs=changed), kinds=FEW)
     assert found.repeatability is not None
