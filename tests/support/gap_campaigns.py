@@ -32,7 +32,7 @@ from tunnel_sim.vocabulary.campaign import Campaign, Quantity, RigProperties, Ru
 from tunnel_sim.vocabulary.record import Array, Record
 
 INTERVAL = 4e-3
-DURATION = 10.0
+DURATION = 7.0
 NOISE = 4e-4
 CONDITIONS = tuple((spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 15.0, 25.0))
 FOUR = ((16.12, 0.0), (16.12, 25.0), (44.84, 0.0), (44.84, 15.0))

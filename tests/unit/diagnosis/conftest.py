@@ -8,7 +8,7 @@ from tunnel_sim.effects import effect_from
 
 @pytest.fixture(scope="package")
 def data():
-    return campaign(effect_from("quadratic_damping", {"coefficient": 0.003}))
+    return campaign(effect_from("quadratic_damping", {"coefficient": 0.003}), duration=10.0)
 
 
 @pytest.fixture(scope="package")

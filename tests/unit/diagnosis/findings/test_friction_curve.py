@@ -18,7 +18,7 @@ TRUTH = effect_from("coulomb_friction", {"friction_moment": 0.004, "peak": 1.0, 
 
 @pytest.fixture(scope="module")
 def records():
-    return campaign(TRUTH, damping=0.003)
+    return campaign(TRUTH, damping=0.003, duration=10.0)
 
 
 def fitted(records, *forms):

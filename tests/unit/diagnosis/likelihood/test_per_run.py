@@ -54,7 +54,7 @@ def thrice_skipped(shares: Array) -> Campaign:
 
 
 def fitted(effect: Effect) -> Fit:
-    base = nominal(campaign(effect))
+    base = nominal(campaign(effect, duration=10.0))
     (start,) = starting_points(base, type(effect))
     return fit(start.problem, start.point, base=base)
 

@@ -233,7 +233,7 @@ def test_a_shedding_line_follows_the_wind_speed_that_the_fit_has_corrected():
 
 
 def test_a_sine_in_the_residuals_has_its_amplitude_in_their_spectrum():
-    base = nominal(campaign())
+    base = nominal(campaign(duration=10.0))
     time = base.problem.data.runs[0].interval * np.arange(base.residuals[0].size)
     sine = replace(base, residuals=[3.0 * np.sin(2.0 * np.pi * 7.3 * time + 0.4) for _ in base.residuals])
     spectrum = residual_spectra(sine)[0]

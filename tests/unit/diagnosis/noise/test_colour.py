@@ -161,7 +161,7 @@ def test_noise_of_any_colour_repeats_itself_at_the_stated_rate_at_most(name):
     "effect", [effect_class("coulomb_friction")(0.003), effect_class("cubic_stiffness")(0.3)]
 )
 def test_an_effect_beneath_coloured_noise_is_still_a_gap(name, effect):
-    fit, noise, found = judged(coloured(campaign(effect), name))
+    fit, noise, found = judged(coloured(campaign(effect, duration=10.0), name))
     assert found.detected
     assert noise.colour is not None
     assert not fit.problem.data.runs[0].noise.plain
@@ -174,7 +174,7 @@ def test_a_colour_that_the_wind_hides_is_sought_in_still_air(monkeypatch):
         return None if windy else noise_colour(fit, *args, **kwargs)
 
     monkeypatch.setattr(gap, "noise_colour", hidden)
-    data = coloured(buffeted(campaign(damping=0.04), 0.01, 4.0), "ar1")
+    data = coloured(buffeted(campaign(damping=0.04, duration=10.0), 0.01, 4.0), "ar1")
     fit, noise, found = judged(data)
     assert found.detected
     assert noise.colour is not None
@@ -261,7 +261,7 @@ def test_the_spectrum_and_its_uncertainty_are_those_of_the_noise():
 
 @pytest.mark.parametrize(("stated", "believed"), [(np.sqrt(5.0), True), (1.0, False)])
 def test_colour_beside_a_gap_is_not_believed_where_more_noise_is_seen_than_stated(stated, believed):
-    data = coloured(campaign(effect_class("coulomb_friction")(0.003)), "ar1")
+    data = coloured(campaign(effect_class("coulomb_friction")(0.003), duration=10.0), "ar1")
     sensor = dataclasses.replace(data.sensor, noise_std=stated * NOISE)
     _, noise, found = judged(dataclasses.replace(data, sensor=sensor))
     assert found.detected

@@ -169,7 +169,7 @@ def test_the_p_value_counts_the_tests(fitted):
 
 def test_a_step_in_the_reading_a_thousandth_of_a_swing_is_seen():
     """A gap that a χ² over all samples would miss: a drift of one standard deviation."""
-    data = campaign(added=4e-4 * np.linspace(-0.5, 0.5, 2500))
+    data = campaign(added=4e-4 * np.linspace(-0.5, 0.5, 2500), duration=10.0)
     fit = nominal(data)
     assert abs(fit.excess) < 0.15
     assert verdict(fit).detected

@@ -240,13 +240,13 @@ def test_a_run_without_which_the_model_is_not_determined_is_used_and_named(monke
     first = disturbed_runs.prepared_and_tested
 
     def of_all_runs_only(given, *rest):
-        if len(given.runs) < 6 or any(run.record.time_s[-1] < 9.0 for run in given.runs):
+        if len(given.runs) < 6 or any(run.record.time_s[-1] < 6.5 for run in given.runs):
             raise TunnelError("cannot fit", where="runs", remedy="add runs")
         return first(given, *rest)
 
     monkeypatch.setattr(disturbed_runs, "prepared_and_tested", of_all_runs_only)
     struck = with_blow(campaign(), 5e-3, 4.0, "r2")
-    assert max(run.record.time_s[-1] for run in struck.runs) > 9.0
+    assert max(run.record.time_s[-1] for run in struck.runs) > 6.5
     found = diagnose(struck, kinds=FEW).to_json_dict()
     (one,) = found["disturbed"]
     assert (one["run"], one["kept_until_s"], one["used"]) == ("r2", None, True)

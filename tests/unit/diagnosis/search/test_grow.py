@@ -355,7 +355,7 @@ def test_instants_are_sought_again_beside_a_form() -> None:
     """Beside friction without presliding, further instants follow the error of its frequency."""
     friction = effect_from("coulomb_friction", {"friction_moment": 0.003, "presliding": 0.008})
     lost = effect_from("dropped_samples", {"lost_time": 0.002})
-    base = nominal(gap_campaigns.campaign(friction, lost))
+    base = nominal(gap_campaigns.campaign(friction, lost, duration=10.0))
     found = grow(whole_runs(base, [type(friction), type(lost)]))[0]
     assert found.names == ("coulomb_friction", "dropped_samples")
     assert found.fit.problem.free_forms == ("coulomb_friction.presliding",)

@@ -29,7 +29,6 @@ from tests.support.gap_campaigns import (
     CN_R,
     CONDITIONS,
     DAMPING,
-    DURATION,
     FOUR,
     INERTIA,
     INTERVAL,
@@ -67,13 +66,15 @@ def buffeted(data, intensity, bandwidth, seed=5):
     runs = []
     for run in data.runs:
         if run.wind_on:
-            response = random_response(rng, run.spring_stiffness, run.wind_speed, intensity, bandwidth)
+            response = random_response(
+                rng, run.spring_stiffness, run.wind_speed, intensity, bandwidth, run.record.yaw_rad.size
+            )
             run = replace(run, record=Record(run.record.time_s, run.record.yaw_rad + response))
         runs.append(run)
     return replace(data, runs=tuple(runs))
 
 
-def random_response(rng, spring, speed, intensity, bandwidth):
+def random_response(rng, spring, speed, intensity, bandwidth, count):
     pressure = 0.5 * 1.2 * speed**2 * AREA * LENGTH
     stiffness = spring - pressure * CN_BETA
     damping = DAMPING - pressure * LENGTH / speed * CN_R
@@ -88,7 +89,7 @@ def random_response(rng, spring, speed, intensity, bandwidth):
     scatter = step @ block[:3, 3:]
     root = np.linalg.cholesky(0.5 * (scatter + scatter.T) + 1e-24 * np.eye(3))
     state = np.array([0.0, 0.0, intensity * rng.standard_normal()])
-    angles = np.empty(round(DURATION / INTERVAL))
+    angles = np.empty(count)
     for k in range(angles.size):
         angles[k] = state[0]
         state = step @ state + root @ rng.standard_normal(3)
@@ -215,7 +216,7 @@ def test_turbulence_is_not_called_vortices_where_buffeting_is_excluded():
 
 def test_weak_turbulence_is_seen_beside_a_spring_that_closes_all_but_a_hundredth_of_the_gap():
     strong = effect_from("cubic_stiffness", {"coefficient": -0.2})
-    base = nominal(buffeted(campaign(strong), 0.0012, 4.0))
+    base = nominal(buffeted(campaign(strong, duration=10.0), 0.0012, 4.0))
     (start, *_) = starting_points(base, type(strong))
     spring = Hypothesis(("cubic_stiffness",), fit(start.problem, start.point, base=base))
     assert 0.005 < spring.fit.excess / base.excess < 0.015
@@ -269,7 +270,11 @@ def test_beside_turbulence_that_misleads_all_sets_they_are_grown_anew():
 
 def test_an_effect_of_the_wind_that_is_weak_beside_turbulence_is_found():
     """It closes too little of the gap to be compared by shares, but far more than chance."""
-    base = nominal(buffeted(campaign(effect_from("nonlinear_yaw_moment", {"coefficient": 0.6})), 0.004, 4.0))
+    base = nominal(
+        buffeted(
+            campaign(effect_from("nonlinear_yaw_moment", {"coefficient": 0.6}), duration=10.0), 0.004, 4.0
+        )
+    )
     kinds = (*BUFFETING, effect_class("nonlinear_yaw_moment"), effect_class("nonlinear_yaw_damping"))
     (answer,) = weigh_random_moments(whole_runs(base, kinds), [])
     assert answer.names == ("buffeting", "nonlinear_yaw_moment")
@@ -365,7 +370,7 @@ def with_moment(data, moment):
                 run.spring_stiffness - pressure * CN_BETA,
                 DAMPING - pressure * LENGTH / speed * CN_R,
             )
-            time = np.arange(2 * round(DURATION / INTERVAL)) * INTERVAL / 2
+            time = np.arange(2 * run.record.yaw_rad.size) * INTERVAL / 2
             given = pressure * moment(time, speed)
             angle = response(given, INTERVAL / 2, INERTIA, damping, stiffness)[::2]
             run = replace(run, record=Record(run.record.time_s, run.record.yaw_rad + angle))

@@ -18,7 +18,7 @@ from tunnel_sim.effects import ALL_EFFECTS, effect_class
 
 @pytest.fixture(scope="module")
 def data():
-    return nominal(campaign()).problem.data
+    return nominal(campaign(duration=10.0)).problem.data
 
 
 def test_stretches_hold_every_block_once(data):
