@@ -23,6 +23,7 @@ MOMENT, ROOT = INPUTS["moment_nm"], INPUTS["base_rad"]
 
 INTERVAL = 4e-3
 SAMPLES = 2501
+TURN = 0.04  # greatest phase of the ringing in a step, rad
 
 
 def run(compliance=1e-3, share=0.3, speed=25.0, spring=44.84, **terms: float) -> RunSettings:
@@ -36,7 +37,9 @@ def run(compliance=1e-3, share=0.3, speed=25.0, spring=44.84, **terms: float) ->
 def followed(settings: RunSettings) -> Array:
     """The upper end's angle in steps that follow the rod."""
     row, keep_alive = forward_run(settings)
-    row["steps"] = steps = 160
+    rod = settings.rod_twist
+    fastest = 0.0 if rod is None else rod.free_frequency(settings.yaw_inertia)
+    row["steps"] = steps = max(40, round(INTERVAL * fastest / TURN))
     row["step"] = INTERVAL / steps
     angle, _, status = integrate(parameter_vector(settings.law(RIG))[None], row, SAMPLES)
     del keep_alive

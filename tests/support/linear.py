@@ -35,7 +35,7 @@ def linear_campaign(
     zeta: float = 0.005,
     quantity: Quantity = "angle",
     noise: float = 1e-3,
-    cycles: int = 25,
+    cycles: int = 15,
 ) -> Campaign:
     """A mass that is released on springs.
 

@@ -27,7 +27,7 @@ TRUTH = Truth(0.47, -0.12, 0.1014, 0.018)
 
 def plan(speeds, name="reynolds_dependence", **values):
     conditions = tuple(
-        Condition(f"s{spring:g}-v{speed:g}", spring, speed, 1.204, radians(12.0), 10.0)
+        Condition(f"s{spring:g}-v{speed:g}", spring, speed, 1.204, radians(12.0), 7.0)
         for spring, speed in product((16.12, 44.84), speeds)
     )
     effects = (EffectSetting(name, values),) if values else ()

@@ -20,7 +20,10 @@ from tunnel_sim.vocabulary.record import Record
 @pytest.fixture(scope="module")
 def cart() -> Campaign:
     """A mass on two springs, with the noise of one sensor."""
-    campaign, rng = linear_campaign(2.0, (3.0, 5.0), (0.02, 0.01), noise=0.0), np.random.default_rng(5)
+    campaign, rng = (
+        linear_campaign(2.0, (3.0, 5.0), (0.02, 0.01), noise=0.0, cycles=25),
+        np.random.default_rng(5),
+    )
     runs = []
     for run in campaign.runs:
         reading = run.record.yaw_rad + 3e-5 * rng.standard_normal(run.record.yaw_rad.size)

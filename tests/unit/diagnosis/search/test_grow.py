@@ -323,7 +323,7 @@ def test_forms_are_tried_only_where_they_could_win_and_once(monkeypatch: pytest.
 def test_friction_takes_the_form_that_the_runs_ask_for(form, freed) -> None:
     """One form of several, at its own values."""
     friction = effect_from("coulomb_friction", {"friction_moment": 0.008, **form})
-    base = nominal(gap_campaigns.campaign(friction))
+    base = nominal(gap_campaigns.campaign(friction, duration=10.0))
     (lead,) = starting_points(base, type(friction))
     textbook = Hypothesis(("coulomb_friction",), fit(lead.problem, lead.point, base=base))
     assert not within_noise(textbook.fit)

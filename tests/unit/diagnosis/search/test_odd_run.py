@@ -65,7 +65,7 @@ def clipped(yaw: Array) -> Array:
 
 @pytest.fixture(scope="module")
 def plain() -> Campaign:
-    return campaign(duration=8.0)
+    return campaign(duration=7.0)
 
 
 @pytest.mark.parametrize("change", [filtered, slow(clipped)])
@@ -89,7 +89,7 @@ def test_of_a_held_start_the_free_motion_is_kept(plain: Campaign) -> None:
 
 def test_a_hold_of_more_than_a_cycle_is_left_out_whole(plain: Campaign) -> None:
     """Beside a cause, which hides a run that differs as a whole."""
-    friction = campaign(effect_from("coulomb_friction", {"friction_moment": 0.003}), duration=8.0)
+    friction = campaign(effect_from("coulomb_friction", {"friction_moment": 0.003}), duration=6.0)
 
     def still(yaw: Array) -> Array:
         return np.concatenate([np.full(round(0.8 / INTERVAL), yaw[0]), yaw])
@@ -120,11 +120,11 @@ def test_a_run_alone_at_its_spring_or_without_wind_is_not_odd(plain: Campaign) -
 
 def test_a_cause_of_all_runs_accuses_none() -> None:
     """One run alone swings far enough for the cubic spring: without it there is no gap."""
-    cubic = campaign(effect_from("cubic_stiffness", {"coefficient": 0.3}), duration=8.0)
+    cubic = campaign(effect_from("cubic_stiffness", {"coefficient": 0.3}), duration=6.0)
     rng, zero = np.random.default_rng(4), 0.001
     small = [
         replace(run, record=Record(run.record.time_s, zero + 0.05 * (run.record.yaw_rad - zero) + own))
-        for run in campaign(duration=8.0).runs
+        for run in campaign(duration=6.0).runs
         for own in [rng.normal(0.0, NOISE, run.record.yaw_rad.size)]
     ]
     found = investigate(replace(cubic, runs=(*small[:4], cubic.runs[4], small[5])), FEW)

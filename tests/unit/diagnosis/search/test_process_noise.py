@@ -238,7 +238,9 @@ def test_a_rival_beside_turbulence_is_an_answer_as_well():
 @pytest.mark.slow
 def test_skips_beside_strong_turbulence_are_placed_where_they_are():
     """Least squares takes the motion that turbulence drives for white noise, and misplaces them."""
-    base = nominal(buffeted(campaign(effect_from("dropped_samples", {"lost_time": 0.006})), 0.01, 4.0))
+    base = nominal(
+        buffeted(campaign(effect_from("dropped_samples", {"lost_time": 0.006}), duration=10.0), 0.01, 4.0)
+    )
     (start,) = starting_points(base, effect_class("dropped_samples"))
     white = fit(start.problem, start.point, base=base)
     planted = np.linspace(0.2, 0.8, len(CONDITIONS))  # shares of the runs
@@ -256,7 +258,7 @@ def test_skips_beside_strong_turbulence_are_placed_where_they_are():
 def test_beside_turbulence_that_misleads_all_sets_they_are_grown_anew():
     friction = effect_from("coulomb_friction", {"friction_moment": 0.003})
     spring = effect_from("cubic_stiffness", {"coefficient": -0.03})
-    base = nominal(buffeted(campaign(friction, spring), 0.02, 4.0))
+    base = nominal(buffeted(campaign(friction, spring, duration=10.0), 0.02, 4.0))
     names = ("buffeting", "coulomb_friction", "cubic_stiffness", "quadratic_damping")
     kinds = [effect_class(name) for name in names]
     misled = grow(whole_runs(base, kinds[1:]))

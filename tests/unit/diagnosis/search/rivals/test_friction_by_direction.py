@@ -31,7 +31,7 @@ pytestmark = pytest.mark.usefixtures("causes_alone")
 
 MODEL = robot(TRUE, axis=LEVEL, tip=0.2)
 INERTIA, WEIGHT, DAMPING = inertia(MODEL), 9.81 * (1.5 * 0.2 + 0.2 * 0.4), 0.4  # kg m2, N m, N m s/rad
-SUBSTEPS = 20
+SUBSTEPS = 10
 KINDS = vocabulary(("coulomb_friction", "quadratic_damping", "gravity_stiffness"))
 
 

@@ -27,7 +27,7 @@ def decays(
 ) -> Campaign:
     """Linear decays at three speeds, with relative errors of inertia and stiffness by spring."""
     rng, runs = np.random.default_rng(4), list[Run]()
-    time = INTERVAL * np.arange(2500)
+    time = INTERVAL * np.arange(1750)
     for spring, error in inertias.items():
         for speed in (0.0, 20.0):
             pressure = 0.5 * DENSITY * speed * AREA * LENGTH
