@@ -268,9 +268,8 @@ def is_plausible(fitted: Fit) -> bool:
 
 def extremes(data: Data) -> tuple[float, float]:
     """The least and the greatest reading of a campaign."""
-    return min(float(run.reading.min()) for run in data.runs), max(
-        float(run.reading.max()) for run in data.runs
-    )
+    least, greatest = zip(*((run.reading.min(), run.reading.max()) for run in data.runs), strict=True)
+    return float(min(least)), float(max(greatest))
 
 
 def turned_back(fitted: Fit) -> Fit:

@@ -31,7 +31,7 @@ FADING: Final = 1.5
 """Ratio of the intensity in the first third of the runs to the intensity in the last third, above which a moment
 fades with the motion. Judgement. The rest of a motion that a model misses decays with it; the surroundings and the
 wind do not know when a run began. Real turbulence is not exactly stationary."""
-STEADY_LINE_SHARE: Final = 0.75
+LINE_SHARE: Final = 0.75
 """Share of the residual explained by a line with an amplitude and a phase per run, above which the moment is none.
 Judgement (decision 0046). A line explains at most 0.66 of sixteen drawn moments of the stream, and 0.73 to 1.1 of a
 mode of the mount at 1.05 to 1.3 times the frequency of the motion."""
@@ -145,7 +145,7 @@ def is_a_line(fit: Fit, process: ProcessNoise) -> bool:
             near = np.abs(np.linspace(part.centre - reach, part.centre + reach, _LINES))
             drops.append(float(np.max(_line_drops(fit, process, near, _LINE_DECAYS / longest))))
     residuals = (r for run, r in zip(fit.problem.data.runs, fit.residuals, strict=True) if run in runs)
-    return max(drops) > STEADY_LINE_SHARE * sum(float(r @ r) - r.size for r in residuals)
+    return max(drops) > LINE_SHARE * sum(float(r @ r) - r.size for r in residuals)
 
 
 def _line_drops(fit: Fit, process: ProcessNoise, frequency: Array, decay: Array) -> Array:
