@@ -275,7 +275,7 @@ def second_order_starts(base: Fit, kind: type[Effect], *, passive: bool) -> list
     if not base.problem.data.may_show(kind):
         return found
     for trial in kind.trials(_circumstances(base)):
-        if trial.second_order and trial.passive >= passive and trial.scaled is not None:
+        if trial.second_order and (trial.passive or not passive) and trial.scaled is not None:
             problem = dataclasses.replace(base.problem, effects=(*base.problem.effects, kind))
             own = _own_parameters(problem, kind)
             sizes = np.array([trial.values.get(info.name, info.default) for info in own])

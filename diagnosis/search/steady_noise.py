@@ -33,8 +33,8 @@ fades with the motion. Judgement. The rest of a motion that a model misses decay
 wind do not know when a run began. Real turbulence is not exactly stationary."""
 LINE_SHARE: Final = 0.75
 """Share of the residual explained by a line with an amplitude and a phase per run, above which the moment is none.
-Judgement (decision 0046). A line explains at most 0.66 of sixteen drawn moments of the stream, and 0.73 to 1.1 of a
-mode of the mount at 1.05 to 1.3 times the frequency of the motion."""
+Judgement (decision 0046). A line explains 0.46 of sixteen drawn moments of the stream at most, 0.66 taken for the
+other source, and 0.66 to 1.1 of a mode of the mount at 1.05 to 1.3 times the frequency of the motion."""
 
 SLOW_SHARE: Final = 0.5
 """Share of the drop of −2 ln L by a random moment that slow changes of the reading bring, above which it is none.

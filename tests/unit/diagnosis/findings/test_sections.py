@@ -315,17 +315,19 @@ def test_what_to_do_next(given: Document, changes: Document, words: list[str]) -
         assert part in step
 
 
-@pytest.mark.parametrize("scatter", [0.0, 0.2])
-def test_two_runs_do_not_show_whether_the_coefficients_may_be_used(given: Document, scatter: float) -> None:
+@pytest.mark.parametrize(("runs", "scatter"), [(2, 0.0), (2, 0.2), (3, 0.0)])
+def test_two_runs_do_not_show_whether_the_coefficients_may_be_used(
+    given: Document, runs: int, scatter: float
+) -> None:
     """Unless the campaign states how far its runs differ: the intervals then allow for it."""
-    gap = given["gap"] | {"runs": given["gap"]["runs"][:2]}
+    gap = given["gap"] | {"runs": given["gap"]["runs"][:runs]}
     after = {
         name: one | ({"shares": {"scatter": scatter, "noise": 1.0 - scatter}} if scatter else {})
         for name, one in given["coefficients"]["after"].items()
     }
     coefficients = given["coefficients"] | {"after": after}
     steps = next_steps(findings_of(given | {"causes": [], "gap": gap, "coefficients": coefficients}))
-    if scatter:
+    if scatter or runs == 3:
         assert steps[0].startswith("Use the coefficients as they are")
     else:
         assert [step.partition(":")[0] for step in steps] == [
