@@ -119,9 +119,9 @@ def _confirmed(fit: Fit, start: StartingPoint, linear: _Size, reach: float) -> _
     """The size at which a refit is ``reach`` above the least −2 ln L, with the changes of the coefficients.
 
     A refit confirms a size if its rise is within a tenth of ``reach``. A refit beyond that confirms it too if a
-    size close to it lies within. Otherwise the next size follows from the sizes already refitted (`_nearer`).
-    An effect with a phase or an instant in every run keeps its size by linear theory: its change is a sum of
-    lines or steps, linear in the size.
+    size close to it lies within. Where linear theory fails, the least is that of the refits, one of them at the
+    most likely size, and of the fit; the next size follows from these (`_nearer`). An effect with a phase or an
+    instant in every run keeps its size by linear theory: its change is a sum of lines or steps, linear in the size.
 
     Returns:
         None where no refit confirms a size, or the runs exclude no size at all.
@@ -129,20 +129,23 @@ def _confirmed(fit: Fit, start: StartingPoint, linear: _Size, reach: float) -> _
     assert start.scaled is not None
     if start.point.per_run.shape[1] > fit.point.per_run.shape[1]:
         return linear
-    limit = fit.unlikelihood - linear.lowered
     least, greatest = sorted(one[start.scaled] for one in start.problem.bounds)
     size = float(
         np.clip(linear.size, least, greatest)
     )  # a multiple of a trial may exceed its bound by rounding
-    known: list[tuple[float, float]] = []
+    lowest = fit.unlikelihood - linear.lowered
+    known = [(0.0, fit.unlikelihood)]
     near: tuple[float, Point] | None = None
-    for _ in range(_REFITS):
+    for number in range(_REFITS):
         again = _held(fit, start, size, near)
         if again is None:
             return None
-        rise = (again.unlikelihood - limit) / reach
+        known.append((size, again.unlikelihood))
+        if number:
+            lowest = min(value for _, value in known)
+        rise = (again.unlikelihood - lowest) / reach
         # refits beside chance differences may end in several minima, so the rise may have a step
-        within = max((abs(one) for one, root in known if root < 1.0), default=0.0)
+        within = max((abs(one) for one, value in known if value < lowest + reach), default=0.0)
         close = rise > 1.0 and within < abs(size) < _CLOSE * within
         if close and rise > _STEP:  # this refit failed, and its coefficients say nothing
             return None
@@ -154,31 +157,50 @@ def _confirmed(fit: Fit, start: StartingPoint, linear: _Size, reach: float) -> _
             )
         if rise < 1.0 or near is None:
             near = size, again.point
-        known.append((size, float(max(rise, _LEAST_RISE) ** (0.25 if start.second_order else 0.5))))
-        further = float(np.clip(_nearer(known), least, greatest))
+        if number == 0 and linear.lowered > _CONFIRMED * reach and linear.likeliest * size > 0.0:
+            further = linear.likeliest
+        else:
+            further = float(np.clip(_nearer(known, lowest, reach, start.second_order), least, greatest))
         if further == size:  # all sizes of the range are allowed
             return None
         size = further
     return None
 
 
-def _nearer(known: Sequence[tuple[float, float]]) -> float:
-    """The size at which the root of the rise is 1, from sizes and their roots, by the secant.
+def _nearer(known: Sequence[tuple[float, float]], lowest: float, reach: float, second_order: bool) -> float:
+    """The size at which the root of the rise is 1, from sizes and their −2 ln L, by the secant.
 
-    The rise is a parabola about the most likely size, so its root is a line.
+    The rise is a parabola about the most likely size, so its root is a line; where the first order is absorbed, a
+    line in the square of the size. Refits within that lie below this line twice in a row contradict the next refit
+    beyond, which may be in another minimum: it is made again, from nearer.
     """
-    size, root = known[-1]
-    inside = max((one for one in known if one[1] < 1.0), key=lambda one: abs(one[0]), default=None)
-    outside = min((one for one in known if one[1] > 1.0), key=lambda one: abs(one[0]), default=None)
-    if inside is not None and outside is not None:
-        (low, below), (high, above) = inside, outside
-        same = len(known) > 2 and (known[-1][1] < 1.0) == (known[-2][1] < 1.0)  # the secant stalls
-        share = 0.5 if same else (1.0 - below) / (above - below)
-        return low + share * (high - low)
-    before, earlier = known[-2] if len(known) > 1 else (0.0, 0.0)
-    slope = (root - earlier) / (size - before) * np.sign(size)
-    further = size + np.sign(size) * (1.0 - root) / slope if slope > 0.0 else size * _WIDEST
-    return float(np.clip(further / size, 1.0 / _WIDEST, _WIDEST)) * size
+    power = 2.0 if second_order else 1.0
+    least: dict[float, float] = {}
+    for size, value in known:
+        least[size] = min(value, least.get(size, np.inf))
+    vertex = abs(min(least.items(), key=lambda one: one[1])[0]) ** power
+
+    def root(size: float) -> tuple[float, float]:
+        place, rise = abs(size) ** power, max(least[size] - lowest, 0.0) / reach
+        return place, float(np.copysign(np.sqrt(rise), place - vertex))
+
+    roots = {size: root(size) for size in least}
+    low, below = max(one for one in roots.values() if one[1] < 1.0)
+    (high, above), beyond = min(
+        ((one, size) for size, one in roots.items() if one[0] > low), default=((np.inf, np.inf), np.inf)
+    )
+    if high < np.inf:
+        sides = [roots[size][1] < 1.0 for size, _ in known[-2:]]
+        stalls = len(known) > 3 and sides[0] == sides[1]
+        if stalls and sides[0] and sum(size == beyond for size, _ in known) == 1:
+            return beyond
+        place = low + (0.5 if stalls else (1.0 - below) / (above - below)) * (high - low)
+    else:
+        before, earlier = max((one for one in roots.values() if one[0] < low), default=(0.0, below))
+        slope = (below - earlier) / (low - before) if low > before else 0.0
+        further = low + (1.0 - below) / slope if slope > 0.0 else np.inf
+        place = min(further, low * _WIDEST**power)
+    return float(np.copysign(place ** (1.0 / power), known[1][0]))
 
 
 def _held(fit: Fit, start: StartingPoint, size: float, near: tuple[float, Point] | None) -> Fit | None:
@@ -221,7 +243,6 @@ _CONFIRMED = 0.1  # greatest distance of a rise from the limit's rise, as a shar
 _CLOSE = 1.1  # maximum ratio of a size beyond the limit to one within it, for both to confirm the limit
 _STEP = 10.0  # maximum rise just beyond the limit, in the limit's rise; a failed refit rose by 17,806
 _WIDEST = 10.0  # greatest factor between two sizes that are refitted
-_LEAST_RISE = 1e-3  # as a share of the limit's rise
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,7 +252,8 @@ class _Size:
     size: float
     moves: Array  # moves of the coefficients there, shape (coefficients,)
     drop: float  # least χ², less the chance gain of parameters per run
-    lowered: float  # drop of χ² at the most likely size
+    likeliest: float  # the most likely size
+    lowered: float  # drop of χ² there
 
 
 def _largest(fit: Fit, start: StartingPoint, influence: Sequence[Array], reach: float) -> _Size | None:
@@ -281,7 +303,8 @@ def _within(
         for j in range(len(terms)):
             rise[2 - i - j] += gram[i, j]
     turns = [k for k in _real_roots(np.asarray(np.polyder(rise), np.float64)) if least <= k <= greatest]
-    lowest = min(np.polyval(rise, [0.0, *turns]))
+    likeliest = min([0.0, *turns], key=lambda k: float(np.polyval(rise, k)))
+    lowest = float(np.polyval(rise, likeliest))
     ends = _real_roots(rise - np.array([0.0, 0.0, 0.0, 0.0, lowest + reach]))
     if not ends:
         return None
@@ -289,7 +312,7 @@ def _within(
     moved = np.array([outermost, outermost**2][: len(parts)]) @ slopes
     by_chance = own_gain(start.problem) - own_gain(fit.problem)
     # zero first: of two equal numbers max takes the first, and this one is not negative
-    return _Size(outermost * size, moved, max(0.0, -lowest - by_chance), max(0.0, -float(lowest)))
+    return _Size(outermost * size, moved, max(0.0, -lowest - by_chance), likeliest * size, max(0.0, -lowest))
 
 
 def _real_roots(polynomial: Array) -> list[float]:

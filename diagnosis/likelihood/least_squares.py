@@ -32,7 +32,9 @@ _SINGULAR = 1e-12
 _TAKES_PART = 1e-6  # share of a unit vector: smaller parts are rounding
 _FORESEEN = 0.5  # minimum drop of χ² as a share of the foreseen drop, for sensitivities to be used again
 _LINEAR = 0.1  # drop of χ² below which the last step near another fit is taken by linear theory
+_DAMPING = 1e-6  # at the start
 _TRIES = 9  # number of tried dampings in a step, each ten times the previous one
+_TRIES_NEAR = 4  # the same near another fit, where new sensitivities are better than more damping
 
 
 class FitError(ArithmeticError):
@@ -303,9 +305,12 @@ def fit_near(problem: Problem, start: Point, base: Fit, *, max_iterations: int) 
             end = state.foreseen()
             drop = state.here.cost - end.cost
             if drop >= _LINEAR:
-                if state.improve() >= _FORESEEN * drop:
+                gain = state.improve(_TRIES_NEAR)
+                if gain >= _FORESEEN * drop:
                     fresh = False
                     continue
+                if fresh and known is None and gain < _LINEAR:  # χ² is rough, and no step lowers it
+                    break
                 known = None if fresh else known
             elif fresh:
                 state.here = end
@@ -352,7 +357,7 @@ class _State:
         self.here = _Place.of(problem, point)
         if not np.isfinite(self.here.cost):
             raise FitError("the model's motion grows without bound")
-        self.damping = 1e-6
+        self.damping = _DAMPING
         self.jacobian: list[tuple[Array, Array]] = []
         self.products: Products | None = None
 
@@ -378,10 +383,10 @@ class _State:
         ]
         return _Place(point, here.prediction, residuals, _cost(self.problem, point, residuals))
 
-    def improve(self) -> float:
+    def improve(self, tries: int = _TRIES) -> float:
         """Take one damped step; returns the drop of χ², 0 where no step lowers it."""
         here = self.problem, self.here.point, self.here.residuals, self.jacobian
-        for _ in range(_TRIES):
+        for _ in range(tries):
             point = clip(self.problem, damped_step(*here, self.damping, self.products))
             trial = _Place.of(self.problem, point)
             if self.problem.scatter:

@@ -195,6 +195,40 @@ def test_a_refit_in_another_minimum_confirms_no_limit(monkeypatch):
     assert found.moves == {}
 
 
+def test_refits_that_end_too_high_are_made_again_from_a_nearer_one(monkeypatch):
+    """A refit that starts further from its minimum than half of the limit ends in another minimum."""
+    name = "wind_speed_drift"
+    base, limited = found_beside(campaign(), name)
+    held, limit = hidden._held, limited[name].size.value
+
+    def refit(fit, start, size, near):
+        again = held(fit, start, size, near)
+        inside = near is not None and abs(near[0]) < 0.99 * abs(limit)
+        worse = 0.0 if inside or abs(size) < 0.5 * abs(limit) else 6.0
+        return replace(again, chi2=again.chi2 + worse / again.chi2.size)
+
+    monkeypatch.setattr(hidden, "_held", refit)
+    (found,) = hidden_effects(base, starts_beside(base, [effect_class(name)]))
+    assert found.size.determined
+    assert found.size.value == pytest.approx(limit, rel=0.1)
+
+
+def test_a_drop_that_no_refit_confirms_does_not_prevent_a_limit(monkeypatch):
+    """Linear theory foresees that the effect lowers −2 ln L by nine units, and it lowers it by chance only."""
+    name = "wind_speed_drift"
+    base, limited = found_beside(campaign(), name)
+    largest, limit = hidden._largest, limited[name].size.value
+
+    def wrong(*given):
+        one = largest(*given)
+        return replace(one, size=2.0 * one.size, likeliest=one.size, lowered=9.0)
+
+    monkeypatch.setattr(hidden, "_largest", wrong)
+    (found,) = hidden_effects(base, starts_beside(base, [effect_class(name)]))
+    assert found.size.determined
+    assert found.size.value == pytest.approx(limit, rel=0.2)
+
+
 def test_a_further_effect_that_coloured_noise_takes_up_is_said_to_be_significant():
     """A drift of 1.5 mrad in every run, beside vortices in coloured noise that is twice as large as the white."""
     shedding = effect_from("vortex_shedding", {"amplitude": 0.1, "strouhal_number": 0.12})
