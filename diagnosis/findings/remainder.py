@@ -38,7 +38,7 @@ from identification.show.numbers import (
     unit_shown,
     with_std,
 )
-from identification.show.quantity import INTERVAL
+from identification.show.quantity import INTERVAL, Quantity
 from identification.show.style import figure, grid, styled
 from tunnel_sim.effects.capabilities import AtRandom
 from tunnel_sim.effects.registry import known_effects
@@ -76,6 +76,11 @@ class Move:
     unit: str
     material: bool = False
 
+    @property
+    def most(self) -> float:
+        """Upper limit of the move, in ``unit``: its value, or the standard deviation if that is larger."""
+        return max(self.value, self.std or 0.0)
+
 
 @dataclass(frozen=True)
 class Remainder:
@@ -104,6 +109,12 @@ class Remainder:
         """Whether a part of the gap remains: it is material, or visible in the fit whatever the coefficients do."""
         return self.significant and (self.material or self.excess > 1.0)
 
+    def is_small(self, coefficients: Mapping[str, Quantity]) -> bool:
+        """Whether the remaining gap, if any, moves every determined coefficient by 1 % at most."""
+        known = {name: move.most for name, move in self.moves.items() if move.std is not None}
+        limits = {name: MATERIAL_SHARE * abs(coefficients[name].value) for name in known}
+        return not self.significant or all(known[name] <= limit for name, limit in limits.items())
+
     def in_words(self, judged: Judged) -> str:
         """The remaining gap, in sentences."""
         rest, causes = self, judged.causes
@@ -130,13 +141,11 @@ class Remainder:
         elif not known:
             words = f"{subject} changes no coefficient that these runs determine."
         else:
-            most = {name: max(moves[name].value, moves[name].std or 0.0) for name in known}
             bounds = _each(
-                {name: f"less than {change_up_to(size, after[name])}" for name, size in most.items()}
+                {name: f"less than {change_up_to(moves[name].most, after[name])}" for name in known}
             )
-            words = (
-                f"{subject} changes {bounds}." if named else f"The gap is immaterial: it changes {bounds}."
-            )
+            start = subject if named or not self.is_small(after) else "The gap is immaterial: it"
+            words = f"{start} changes {bounds}."
         if rest.further:
             words += f" {plain(rest.further).capitalize()} is significant, but too small to be named."
         return words

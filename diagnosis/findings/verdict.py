@@ -115,7 +115,9 @@ def _answer(answer: Findings, rest: str) -> str:
         explained = f"No known effect explains {'the rest' if sure else 'it'} (tunnel effects lists them)."
         sentence = beside + ("No effect is named as its cause." if nearly else explained)
         return " ".join(filter(None, (there_is, sentence, nearly, rest, repeats)))
-    changes = {} if answer.rest_is_material else facts.immaterial
+    left = answer.rest
+    small = left is None or (not left.material and left.is_small(answer.coefficients_after))
+    changes = facts.immaterial if small else {}
     last = (explained, rest, _immaterial(changes) or consequence(answer.coefficients, answer))
     if not proper:
         return " ".join(filter(None, (there_is, repeats, "These differences explain", *last)))

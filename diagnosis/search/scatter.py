@@ -226,23 +226,30 @@ def _shown(columns: ScatterColumns, prior: WidthPrior, chosen: ScatterSettings) 
     return varying
 
 
-def drifting(fitted: Fit) -> Between | None:
-    """The drifts that explain all differences between the runs of a fit by their order; None where they do not.
-
-    Such differences are not scatter.
-    """
+def with_drifts(fitted: Fit) -> Between | None:
+    """The differences between the runs of a fit beside drifts in their order; None where the runs show no drift."""
     scatter, chosen = fitted.problem.scatter, fitted.settings.scatter
     if not scatter or len(fitted.residuals) < _IN_ORDER:
         return None
     columns, prior = fitted.columns, width_prior(fitted.problem)
     if not _evident(columns, prior, np.ones(len(scatter), bool), chosen):
         return None
-    places = [int(place) for place in np.flatnonzero(_shown(columns, prior, chosen))]
-    if not all(drifts(fitted, place) for place in places):
-        return None
-    for place in places:
+    drifting = [
+        int(place)
+        for place in np.flatnonzero(_shown(columns, prior, chosen))
+        if _gain_of_drift(columns, prior, int(place)) > chdtri(1.0, chosen.trend_rate)
+    ]
+    for place in drifting:
         columns, _ = columns.with_drift(place)
-    return columns.likeliest(prior)
+    return columns.likeliest(prior) if drifting else None
+
+
+def only_drifts(fitted: Fit) -> bool:
+    """Whether the runs of a fit differ, and only by drifts in their order. Such differences are not scatter."""
+    if with_drifts(fitted) is None:
+        return False
+    shown = _shown(fitted.columns, width_prior(fitted.problem), fitted.settings.scatter)
+    return all(drifts(fitted, int(place)) for place in np.flatnonzero(shown))
 
 
 def drifts(fitted: Fit, place: int) -> bool:
@@ -253,10 +260,16 @@ def drifts(fitted: Fit, place: int) -> bool:
     """
     columns, prior, chosen = fitted.columns, width_prior(fitted.problem), fitted.settings.scatter
     beside, _ = columns.with_drift(place)
-    gain = columns.likeliest(prior).likelihood - beside.likeliest(prior).likelihood
+    gain = _gain_of_drift(columns, prior, place)
     all_of_them = np.ones(prior.usual.size, bool)
     left = _gain(beside, prior, all_of_them, np.arange(prior.usual.size) == place)
     return bool(gain > chdtri(1.0, chosen.trend_rate) and left < chdtri(1.0, chosen.which_scatters_rate))
+
+
+def _gain_of_drift(columns: ScatterColumns, prior: WidthPrior, place: int) -> float:
+    """Drop of −2 ln L by a drift of one quantity in the order of the runs."""
+    beside, _ = columns.with_drift(place)
+    return columns.likeliest(prior).likelihood - beside.likeliest(prior).likelihood
 
 
 def with_scatter(fitted: Fit, scatter: Scatter) -> Fit:

@@ -20,7 +20,7 @@ from diagnosis.search.hypothesis import Hypothesis, with_forms
 from diagnosis.search.one_more import same_change, sets_with_one_more
 from diagnosis.search.rivals.rival import FoundRival, Rival
 from diagnosis.search.runs_in_view import RunsInView
-from diagnosis.search.scatter import drifting, with_scatter
+from diagnosis.search.scatter import only_drifts, with_drifts, with_scatter
 from diagnosis.search.surviving import refusal
 from diagnosis.search.weigh import weigh
 from diagnosis.search.weights import FittedSet
@@ -77,15 +77,16 @@ class Sets:
     def _fitted_set(self, one: Hypothesis) -> FittedSet:
         """The set as input of the weighing.
 
-        A drift in the order of the runs is neither scatter nor an effect of the vocabulary; it costs as much as
-        an effect.
+        A drift in the order of the runs is neither scatter nor an effect of the vocabulary. Beside any set it costs
+        as much as an effect; where the runs differ by a drift alone, its cause is unknown.
         """
-        drift = None if one.effects else drifting(one.fit)
-        found = one.fitted_set(self.view.repeating, self.view.gap, outside=drift is not None)
-        if drift is None:
+        outside = not one.effects and only_drifts(one.fit)
+        found = one.fitted_set(self.view.repeating, self.view.gap, outside=outside)
+        drifting = with_drifts(one.fit)
+        if drifting is None:
             return found
-        cost = drift.cost(self.view.gap.deviation_precision) + 2.0 * one.fit.settings.weighing.set_price
-        return replace(found, scatter_cost=cost)
+        cost = drifting.cost(self.view.gap.deviation_precision) + 2.0 * one.fit.settings.weighing.set_price
+        return replace(found, scatter_cost=cost if outside else min(cost, found.scatter_cost))
 
     def fitted(self, names: Sequence[str]) -> Hypothesis | None:
         """The set of these effects; None if they were not fitted together."""

@@ -110,6 +110,8 @@ def test_a_gap_whose_rest_could_change_the_coefficients_is_not_immaterial() -> N
     one = answered(("cubic_stiffness",), "stiffness", "frequency along the decay", "always")
     one["found"]["immaterial"] = {"cn_beta": 1e-4, "cn_r": 1e-4}
     one["rest"]["material"] = False
+    assert "The gap is immaterial" not in verdict(findings_of(one), "")  # it may change Cnr by 4.6 %
+    one["rest"]["moves"]["cn_r"]["std"] = 0.002
     assert "The gap is immaterial" in verdict(findings_of(one), "")
     one["rest"]["material"] = True
     assert "The gap is immaterial" not in verdict(findings_of(one), "")

@@ -229,8 +229,13 @@ def test_what_remains(given: Document) -> None:
         "Part of the gap remains: the residual (0.544° root mean square, 21 times the noise) changes Cnβ by less "
         "than"
     )
-    assert rest_words(findings_of(given | {"causes": ["unknown"]})).startswith(
-        "The gap is immaterial: it changes Cnβ by"
+    unknown = given | {"causes": ["unknown"]}
+    assert rest_words(findings_of(unknown)).startswith(
+        "The gap changes Cnβ by less than 0.28 % and Cnr by less"
+    )
+    rest["moves"]["cn_r"]["std"] = 0.002
+    assert rest_words(findings_of(unknown)).startswith(
+        "The gap is immaterial: it changes Cnβ by less than 0.28 %"
     )
     assert rest_words(findings_of(given | {"causes": []})) == "No gap: nothing remains beyond the noise."
     calm = given | {"rest": rest | {"significant": False, "further": "sensor_drift"}}
