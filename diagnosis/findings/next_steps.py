@@ -54,7 +54,8 @@ def steps(answer: Findings) -> list[NextStep]:
     if not decided:
         return [*_deciding(answer), *runs, *model_steps(answer.model, answer), _NO_REPAIR]
     if causes == UNKNOWN:
-        return [_look(answer), *runs, *model_steps(answer.model, answer), *_narrowing(answer)]
+        first = answer.repeated.drift_steps or [_look(answer)]
+        return [*first, *runs, *model_steps(answer.model, answer), *_narrowing(answer)]
     last = [NextStep("Do not trust the coefficients beyond their intervals", "the residual gap changes them")]
     return [
         *_mending(answer),

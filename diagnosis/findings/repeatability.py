@@ -226,11 +226,13 @@ class RunRepeatability:
         trend = next((one for one in self.trends if one.effect == effect), None)
         if trend is None or 2.0 * trend.left**2 > width**2:
             return None
-        number = NUMBERS[SCATTERS[effect]]
-        along = _ALONG.get(trend.along)
-        course = "from the first run to the last" if along is None else f"with the {along}"
-        what = f"Look for what makes {number} differ {course}"
-        return NextStep(what, "most of the difference between runs follows it")
+        return NextStep(_sought(trend), "most of the difference between runs follows it")
+
+    @property
+    def drift_steps(self) -> list[NextStep]:
+        """The steps where the runs differ by drifts alone."""
+        drifts = [one for one in self.trends if one.only]
+        return [NextStep(_sought(one), "the runs differ by nothing else") for one in drifts]
 
     def steps(self, judged: Judged) -> list[NextStep]:
         """Next steps for an outlying run, and for poorly distinguished quantities."""
@@ -301,6 +303,13 @@ class RunRepeatability:
         )
         drawn = Picture("repeatability", caption, description, partial(repeatability_figure, self))
         return (drawn,) if len(self.runs) > 1 else ()
+
+
+def _sought(trend: Trend) -> str:
+    """The search for the cause of a trend between the runs."""
+    along = _ALONG.get(trend.along)
+    course = "from the first run to the last" if along is None else f"with the {along}"
+    return f"Look for what makes {NUMBERS[SCATTERS[trend.effect]]} differ {course}"
 
 
 def _stated(spread: Spread) -> str:

@@ -14,9 +14,11 @@ from scipy.integrate import solve_ivp
 from diagnosis import diagnose, vocabulary
 from diagnosis.compose import Confirmed
 from diagnosis.findings.next_run import separation
+from diagnosis.findings.next_steps import next_steps
 from diagnosis.search.clock import StepClock
 from diagnosis.search.investigate import investigate, nominal_study
 from diagnosis.search.one_more import sets_with_one_more
+from diagnosis.search.scatter import only_drifts, scattered, with_drifts
 from diagnosis.search.study import Study
 from diagnosis.search.views.whole_runs import WholeRuns
 from tests.marks import slow
@@ -224,6 +226,26 @@ def test_what_follows_the_order_of_the_runs_is_no_scatter() -> None:
     assert trend.change == pytest.approx(0.2, abs=0.01)
     assert trend.only
     assert "by chance" not in found.verdict
+    first = (
+        "Look for what makes the mechanical damping differ from the first run to the last: the runs differ by"
+    )
+    assert next_steps(found)[0].startswith(first)
+
+
+@pytest.mark.parametrize(("scatter", "only"), [(0.0, True), (1.0, False)])
+def test_a_drift_beside_scatter_costs_less_than_scatter_as_wide(scatter: float, only: bool) -> None:
+    fitted = nominal_study(campaign(scatter=scatter, drift=0.2), FEW).nominal
+    layered = scattered(fitted, FEW)
+    assert layered is not None
+    beside, between = with_drifts(layered), layered.between
+    assert only_drifts(layered) == only
+    assert beside is not None
+    assert between is not None
+    precision = layered.columns.products.own
+    assert beside.cost(precision) + 6.0 < between.cost(precision)
+    alone = scattered(nominal_study(campaign(scatter=1.0), FEW).nominal, FEW)
+    assert alone is not None
+    assert with_drifts(alone) is None
 
 
 def test_a_run_far_beyond_the_others_is_an_outlier() -> None:
