@@ -56,6 +56,7 @@ def steps(answer: Findings) -> list[NextStep]:
     if causes == UNKNOWN:
         first = answer.repeated.drift_steps or [_look(answer)]
         return [*first, *runs, *model_steps(answer.model, answer), *_narrowing(answer)]
+    meanwhile = NextStep("Until then use the coefficients with the causes, not those without")
     last = [NextStep("Do not trust the coefficients beyond their intervals", "the residual gap changes them")]
     return [
         *_mending(answer),
@@ -63,7 +64,7 @@ def steps(answer: Findings) -> list[NextStep]:
         *model_steps(answer.model, answer),
         *_narrowing(answer),
         NextStep("Then measure again", _expected(answer)),
-        NextStep("Until then use the coefficients with the causes, not those without"),
+        *([meanwhile] if answer.coefficients.after else []),
         *(last if answer.rest_is_material else []),
     ]
 

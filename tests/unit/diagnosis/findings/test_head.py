@@ -190,6 +190,14 @@ def test_a_gap_that_an_unnamed_effect_would_explain_is_of_unknown_cause() -> Non
     assert Head.of(findings_of(given)).what.startswith("A gap of unknown cause; it acts on")
 
 
+def test_runs_without_coefficients_have_none_to_use() -> None:
+    one = two_causes()
+    use = "Until then use the coefficients with the causes, not those without"
+    assert use in " ".join(next_steps(findings_of(one)))
+    one["coefficients"] = one["coefficients"] | {"before": {}, "after": {}}
+    assert use not in " ".join(next_steps(findings_of(one)))
+
+
 def test_no_correction_of_a_coefficient_that_remains_uncertain_is_promised() -> None:
     given = two_causes(causes=[DRY])
     given["candidates"][0] |= {"effect": DRY}
