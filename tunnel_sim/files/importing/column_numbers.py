@@ -46,7 +46,8 @@ _BRACKET = re.compile(
 )
 """``a + b*(…)`` or ``(…)/d + a``."""
 _RATE_FACTS = re.compile(
-    r"(?i)(^|[^a-z])(fs|sample[ _]?rate|sampling[ _]?(rate|frequency)|samplerate|rate[ _]*\(?hz)($|[^a-z])"
+    r"(?i)(^|[^a-z])(fs|sample[ _]?rate|sampling[ _]?(rate|frequency)|samplerate|rate[ _]*\(?hz|"
+    r"(mess|abtast)(rate|frequenz))($|[^a-z])"
 )
 _STEP_FACTS = re.compile(
     r"(?i)(^|[^a-z])(ts|dt|delta[ _]?t|sample[ _]?(time|interval)|sampling[ _]?(time|interval))($|[^a-z])"
@@ -54,6 +55,7 @@ _STEP_FACTS = re.compile(
 _OWN_STEP = re.compile(r"(?i)^(wf_increment|delta_x|(x[ _]?)?increment)( \(s\))?$")
 
 _STEPS = (1.0 / limits.FASTEST_RATE, 1.0 / limits.SLOWEST_RATE)  # s
+_RATE_AGREES = 0.05  # largest relative difference of a stated rate from the times; a rate may be rounded
 
 Calibration = tuple[PerSample, PerSample] | tuple[float, float]
 """Voltages and readings of a table; or offset and factor of a straight line."""
@@ -205,7 +207,29 @@ def in_seconds(
         taken = f"the file states no unit of the times: steps of {step:.4g} are taken as {unit}"
         remarks.append(doubt(f"{taken}; --time-unit changes this"))
     values = values * UNITS["time"][unit] if unit != "s" else values
+    if choices.rate is None:
+        remarks += _contradicted_rate(values, facts, choices)
     return RunColumn(times, values, unit, "time", tuple(remarks))
+
+
+def _contradicted_rate(times: Rows, facts: Mapping[str, float], choices: ImportChoices) -> list[str]:
+    """The remark that the file states another rate than its times show; none where they agree.
+
+    Gaps change the mean step and not the usual one; coarse stamps change the usual step and not the mean.
+
+    Args:
+        times: in s, not a number where a row has none.
+    """
+    interval, origin = sample_interval(facts, choices)
+    known = times[np.isfinite(times)]
+    steps = np.diff(known)
+    if interval is None or not (steps > 0.0).any():
+        return []
+    usual, mean = float(np.median(steps[steps > 0.0])), float(known[-1] - known[0]) / steps.size
+    if any(abs(step / interval - 1.0) <= _RATE_AGREES for step in (usual, mean)):
+        return []
+    shown_rate = f"the times show {1.0 / usual:.6g} Hz"
+    return [doubt(f"{shown_rate}, though {origin}: the times are used; check which of the two is right")]
 
 
 def _refuse_faulty(channel: Channel, where: str) -> None:

@@ -8,6 +8,7 @@ import pytest
 from tunnel_sim import TunnelError
 from tunnel_sim.files.importing.choices import ImportChoices
 from tunnel_sim.files.importing.column_names import named_kind
+from tunnel_sim.files.importing.column_numbers import in_seconds
 from tunnel_sim.files.importing.columns import find_pairs
 from tunnel_sim.files.importing.formats.layout import find_layout
 from tunnel_sim.files.importing.tables import Channel, Table
@@ -145,3 +146,30 @@ def test_many_columns_are_counted_where_they_are_listed() -> None:
 )  # fmt: skip
 def test_what_a_name_calls_a_rate_or_an_acceleration(name: str, kind: str) -> None:
     assert named_kind(name) == kind
+
+
+@pytest.mark.parametrize(
+    ("times", "facts", "said"),
+    [
+        (TIME, {"Sample rate (Hz)": 100.0}, True),
+        (TIME, {"Messrate": 20.0}, False),
+        (TIME, {"Sample rate": 20.4}, False),  # rounded
+        (TIME, {}, False),
+        (np.delete(TIME, slice(80, 160)), {"fs": 20.0}, False),  # a gap
+        (np.round(TIME, 1), {"fs": 20.0}, False),  # stamps coarser than the sampling
+        (
+            np.where(TIME[3] == TIME, np.nan, 1e3 * TIME),
+            {"dt (s)": 0.05},
+            True,
+        ),  # milliseconds taken for seconds
+    ],
+)
+def test_a_stated_rate_that_contradicts_the_times_is_said(
+    times: np.ndarray, facts: dict[str, float], said: bool
+) -> None:
+    found = in_seconds(Channel("time", times, "s"), times.size, facts, ImportChoices(), "log.csv")
+    np.testing.assert_array_equal(found.values, times)
+    assert bool(found.why) == said
+    assert all(words.doubt and "the times are used" in words for words in found.why)
+    stated = in_seconds(Channel("time", times, "s"), times.size, facts, ImportChoices(rate=7.0), "log.csv")
+    assert stated.why == ()
