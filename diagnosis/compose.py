@@ -351,7 +351,7 @@ def _named(
         decision=decision(
             [(one.effect, one.probability) for one in weighed],
             settings.answer,
-            _predictions(closes.gap, patched, place, settings.answer),
+            _predictions(closes, patched, place, settings.answer),
         ),
         coefficients=Coefficients(
             own_estimates(sized["before"], similarity),
@@ -383,15 +383,17 @@ def _cycling(gap: GapSummary, remarks: Sequence[Remark], chosen: AnswerSettings)
 
 
 def _predictions(
-    gap: GapSummary, patched: PatchedModel | None, place: PlaceFound | Nowhere, chosen: AnswerSettings
+    closes: Closing, patched: PatchedModel | None, place: PlaceFound | Nowhere, chosen: AnswerSettings
 ) -> Predictions:
     """The success of the answer's predictions."""
+    gap = closes.gap
     return Predictions(
         held_out=gap.closed,
         ahead=gap.closed_ahead,
         patched=None if patched is None else patched.judged(chosen),
         under_load=None if patched is None else patched.under_load(chosen),
         left=gap.misfit.of_swing(gap.excess_after),
+        part=closes.steps.of_a_part,
         elsewhere=isinstance(place, PlaceFound) and place.elsewhere,
     )
 

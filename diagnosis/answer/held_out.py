@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -65,6 +66,12 @@ class Waterfall:
     steps: tuple[Step, ...] = ()
     without: Mapping[str, float] = field(default_factory=dict)
     held_out: str = ""
+
+    @property
+    def of_a_part(self) -> float:
+        """Largest root mean square misfit with a part of the causes, over the gap's; 0 without a part or a gap."""
+        first, *parts = [max(step.excess, 0.0) for step in self.steps[:-1]] or [0.0]
+        return math.sqrt(max(parts, default=0.0) / first) if first else 0.0
 
     def to_json_dict(self) -> dict[str, Any]:
         """The fields of a document: ``waterfall``, ``waterfall_on`` and ``without``."""

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from diagnosis.answer import held_out
-from diagnosis.answer.held_out import HeldOut, predict_held_out
+from diagnosis.answer.held_out import HeldOut, Step, Waterfall, predict_held_out
 from diagnosis.model.data import Data, folds
 from diagnosis.model.rig import SpringModel
 from diagnosis.model.run_data import RunData
@@ -114,3 +114,20 @@ def test_a_patched_model_that_is_right_closes_the_gap_of_swings_of_a_milliradian
     out = HeldOut({"a": fitted.residuals[0]}, {"a": point})
     closure, _ = native_closure(fitted, fitted, out, out, swing)
     assert closure.native == pytest.approx(1.0, abs=0.2)
+
+
+@pytest.mark.parametrize(
+    ("excesses", "ratio"),
+    [
+        ((4.0, 1.0, 900.0, 0.0), 15.0),  # the second of three causes makes the misfit fifteen times as large
+        ((4.0, 4.0, 0.1), 1.0),
+        ((4.0, -0.1, 0.0), 0.0),
+        ((4.0, 100.0), 0.0),  # all causes, not a part of them
+        ((), 0.0),
+    ],
+)
+def test_the_misfit_with_a_part_of_the_causes_is_relative_to_the_gap(
+    excesses: tuple[float, ...], ratio: float
+) -> None:
+    steps = tuple(Step(str(place), excess) for place, excess in enumerate(excesses))
+    assert Waterfall(steps).of_a_part == pytest.approx(ratio)
