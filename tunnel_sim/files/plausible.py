@@ -36,6 +36,9 @@ _TIME_SLIPS = (1e-6, 1e-3, 1e3, 1e6)
 _SLIP_TOLERANCE = 0.1
 # multiple of the usual step: a longer gap in a record without an oscillation is a jump of the clock
 _JUMP = 50.0
+_FIRST = 5  # number of samples that give the level of a hold
+_HELD, _STILL = 0.1, 0.02  # share of the range that ends a hold; greatest range within its later part
+_HOLD, _LATE = 0.2, (0.6, 0.9)  # least share of a record with a long hold; later part of a hold, as shares
 _JOINED = 6  # number of samples on each side of a jump for the fit of a cubic,
 _SHORT = 400  # or a 400th of the record
 _NEAR = 20  # the body must move in a 20th of the record on each side
@@ -145,7 +148,7 @@ def checked_record(
                 f"{KEEP}",
             )
     record = Record(time_s, reading)
-    cycles = count_cycles(record) if drive is None else 0.0
+    cycles = _cycles_after_hold(record) if drive is None else 0.0
     if drive is None and not cycles >= MINIMUM_CYCLES - CYCLE_TOLERANCE:
         what = f"about {cycles:.1f} cycles of oscillation, fewer than three"
         remedy = "record for longer after the release, or leave the run out"
@@ -175,6 +178,21 @@ def checked_record(
             remedy=f"sample at {LEAST_SAMPLES_PER_CYCLE / (step * per_cycle):.3g} Hz or more; {KEEP}",
         )
     return record
+
+
+def _cycles_after_hold(record: Record) -> float:
+    """Number of cycles of a record, without a long hold before the motion: a hold has none."""
+    cycles, reading = count_cycles(record), record.yaw_rad
+    size = float(np.ptp(np.percentile(reading, [1.0, 99.0])))
+    moved = np.flatnonzero(np.abs(reading - np.median(reading[:_FIRST])) > _HELD * size)
+    begin = int(moved[0]) if moved.size else 0
+    if begin < _HOLD * reading.size:
+        return cycles
+    # a motion that grows from rest is no hold
+    still = np.percentile(reading[int(_LATE[0] * begin) : int(_LATE[1] * begin)], [5.0, 95.0])
+    if float(np.ptp(still)) > _STILL * size:
+        return cycles
+    return min(cycles, count_cycles(Record(record.time_s[begin:], reading[begin:])))
 
 
 def _spoilt(record: Record) -> tuple[str, str] | None:

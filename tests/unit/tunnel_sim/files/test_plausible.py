@@ -116,3 +116,26 @@ def test_what_hides_an_oscillation_is_named(time: Array, reading: Array, says: s
 def test_a_record_without_an_oscillation_is_still_refused_for_that():
     with pytest.raises(TunnelError, match="no oscillation is visible"):
         checked_record(_TIME, 1e-3 * _TIME, "yaw_rad", SensorProperties(), None, "r1")
+
+
+@pytest.mark.parametrize("held", [4.0, 40.0])
+def test_a_hold_before_the_motion_counts_no_cycles(held: float) -> None:
+    """Two cycles and six of a swing of 2 Hz, released from rest at its angle."""
+
+    def of_cycles(cycles: float) -> tuple[np.ndarray, np.ndarray]:
+        time = np.arange(0.0, held + 0.5 * cycles, 0.005)
+        free = np.maximum(time - held, 0.0)
+        swing = 0.35 * np.exp(-0.1 * free) * np.cos(4.0 * np.pi * free)
+        return time, swing + np.random.default_rng(4).normal(0.0, 1e-3, time.size)
+
+    with pytest.raises(TunnelError, match=r"about [12]\.\d cycles of oscillation, fewer than three"):
+        checked_record(*of_cycles(2.0), "yaw_rad", SensorProperties(), None, "r1")
+    checked_record(*of_cycles(6.0), "yaw_rad", SensorProperties(), None, "r1")
+
+
+def test_a_motion_that_grows_from_rest_is_no_hold() -> None:
+    """By a factor of 2.7 in each cycle, from the noise on: fewer than three cycles exceed a tenth of the range."""
+    time = np.arange(0.0, 6.0, 0.005)
+    growth = 0.3 * np.exp(2.0 * (time - 6.0)) * np.sin(4.0 * np.pi * time)
+    reading = growth + np.random.default_rng(5).normal(0.0, 1e-4, time.size)
+    checked_record(time, reading, "yaw_rad", SensorProperties(), None, "r1")
