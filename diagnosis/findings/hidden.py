@@ -160,14 +160,14 @@ def _confirmed(fit: Fit, start: StartingPoint, linear: _Size, reach: float) -> _
         if number == 0 and linear.lowered > _CONFIRMED * reach and linear.likeliest * size > 0.0:
             further = linear.likeliest
         else:
-            further = float(np.clip(_nearer(known, lowest, reach, start.second_order), least, greatest))
+            further = float(np.clip(_nearer(known, reach, start.second_order), least, greatest))
         if further == size:  # all sizes of the range are allowed
             return None
         size = further
     return None
 
 
-def _nearer(known: Sequence[tuple[float, float]], lowest: float, reach: float, second_order: bool) -> float:
+def _nearer(known: Sequence[tuple[float, float]], reach: float, second_order: bool) -> float:
     """The size at which the root of the rise is 1, from sizes and their −2 ln L, by the secant.
 
     The rise is a parabola about the most likely size, so its root is a line; where the first order is absorbed, a
@@ -178,10 +178,11 @@ def _nearer(known: Sequence[tuple[float, float]], lowest: float, reach: float, s
     least: dict[float, float] = {}
     for size, value in known:
         least[size] = min(value, least.get(size, np.inf))
-    vertex = abs(min(least.items(), key=lambda one: one[1])[0]) ** power
+    likeliest, lowest = min(least.items(), key=lambda one: one[1])
+    vertex = abs(likeliest) ** power
 
     def root(size: float) -> tuple[float, float]:
-        place, rise = abs(size) ** power, max(least[size] - lowest, 0.0) / reach
+        place, rise = abs(size) ** power, (least[size] - lowest) / reach
         return place, float(np.copysign(np.sqrt(rise), place - vertex))
 
     roots = {size: root(size) for size in least}
