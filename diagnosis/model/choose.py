@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from diagnosis.model.carriage import Carriage
 from diagnosis.model.loose import LooseBody
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.rig import PerInertia, SpringModel
 from diagnosis.model.servo import Servo, ServoPerInertia
+from diagnosis.model.still_air import StillAir
 from tunnel_sim.vocabulary.campaign import Campaign
 
 #: In the order in which each kind is asked whether it describes a campaign.
-KINDS: tuple[type[NominalModel], ...] = (ServoPerInertia, Servo, LooseBody, PerInertia, Carriage, SpringModel)
+KINDS: tuple[type[NominalModel], ...] = (ServoPerInertia, Servo, LooseBody, PerInertia, StillAir, SpringModel)
 
 
 def nominal_model(campaign: Campaign, given: NominalModel | None = None) -> NominalModel:

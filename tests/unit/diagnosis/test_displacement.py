@@ -19,7 +19,7 @@ import pytest
 
 from diagnosis import diagnose, vocabulary
 from diagnosis.findings.sections import sections
-from diagnosis.model.carriage import Carriage
+from diagnosis.model.still_air import StillAir
 from diagnosis.result import Diagnosis
 from identification import identify
 from identification.show.blocks import as_html
@@ -213,7 +213,7 @@ def damped_by_the_square(quantity: Quantity) -> tuple[Campaign, Diagnosis]:
 def test_an_angle_and_its_twin_have_the_same_numbers(quantity: Quantity) -> None:
     """Bit for bit, with other units; where the motion has the size of a rig's angle."""
     displaced, own = damped_by_the_square(quantity)
-    twin = diagnose(displaced.as_angle, kinds=FEW, model=Carriage())
+    twin = diagnose(displaced.as_angle, kinds=FEW, model=StillAir())
     assert own.causes == twin.causes == ("quadratic_damping",)
     offered = {name: value for name, value in twin.inclusion.items() if name in own.inclusion}
     twin = replace(twin, inclusion=offered)  # of effects that no displacement has the probability is 0

@@ -1,4 +1,4 @@
-"""The nominal model of a displacement: a mass on springs, without air."""
+"""The nominal model of a body on springs in still air."""
 
 from __future__ import annotations
 
@@ -11,8 +11,11 @@ from tunnel_sim.vocabulary.campaign import Campaign
 
 
 @dataclass(frozen=True)
-class Carriage(SpringModel):
-    """A mass on springs of stated stiffness: m ẍ + c ẋ + k x = 0, or a force; its mass and damping are stated."""
+class StillAir(SpringModel):
+    """A body on springs of stated stiffness: I ψ̈ + C ψ̇ + K ψ = 0, or a moment; its inertia and damping are stated.
+
+    For a displacement they are mass and damping, and the moment is a force.
+    """
 
     coefficient_units: ClassVar[Mapping[str, str]] = {
         "yaw_inertia": "kg m2",
@@ -21,9 +24,10 @@ class Carriage(SpringModel):
 
     @classmethod
     def describes(cls, campaign: Campaign) -> bool:
-        """Whether the air does not act on the freedom, and every run states its spring."""
-        return not campaign.sensor.freedom.windy and super().describes(campaign)
+        """Whether the air does not act in any run, and every run states its spring."""
+        windy = campaign.sensor.freedom.windy and any(run.wind_speed for run in campaign.runs)
+        return not windy and super().describes(campaign)
 
     def coefficient_names(self, names: Sequence[str]) -> tuple[str, ...]:
-        """Mass and damping, if they are fitted."""
+        """Inertia and damping, if they are fitted."""
         return tuple(name for name in self.coefficient_units if name in names)
