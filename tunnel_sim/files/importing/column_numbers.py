@@ -207,13 +207,12 @@ def in_seconds(
         taken = f"the file states no unit of the times: steps of {step:.4g} are taken as {unit}"
         remarks.append(doubt(f"{taken}; --time-unit changes this"))
     values = values * UNITS["time"][unit] if unit != "s" else values
-    if choices.rate is None:
-        remarks += _contradicted_rate(values, facts, choices)
+    remarks += _contradicted_rate(values, facts, choices)
     return RunColumn(times, values, unit, "time", tuple(remarks))
 
 
 def _contradicted_rate(times: Rows, facts: Mapping[str, float], choices: ImportChoices) -> list[str]:
-    """The remark that the file states another rate than its times show; none where they agree.
+    """The remark that the file, or an option, states another rate than the times show; none where they agree.
 
     Gaps change the mean step and not the usual one; coarse stamps change the usual step and not the mean.
 
@@ -228,8 +227,8 @@ def _contradicted_rate(times: Rows, facts: Mapping[str, float], choices: ImportC
     usual, mean = float(np.median(steps[steps > 0.0])), float(known[-1] - known[0]) / steps.size
     if any(abs(step / interval - 1.0) <= _RATE_AGREES for step in (usual, mean)):
         return []
-    shown_rate = f"the times show {1.0 / usual:.6g} Hz"
-    return [doubt(f"{shown_rate}, though {origin}: the times are used; check which of the two is right")]
+    rate = f"{1.0 / usual:.4g}"
+    return [doubt(f"the times show {rate} Hz, not {origin}: the times are used; --rate {rate} confirms them")]
 
 
 def _refuse_faulty(channel: Channel, where: str) -> None:

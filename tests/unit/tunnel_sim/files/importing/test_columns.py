@@ -171,5 +171,12 @@ def test_a_stated_rate_that_contradicts_the_times_is_said(
     np.testing.assert_array_equal(found.values, times)
     assert bool(found.why) == said
     assert all(words.doubt and "the times are used" in words for words in found.why)
-    stated = in_seconds(Channel("time", times, "s"), times.size, facts, ImportChoices(rate=7.0), "log.csv")
-    assert stated.why == ()
+
+
+@pytest.mark.parametrize(("rate", "said"), [(20.0, False), (7.0, True)])
+def test_a_stated_rate_confirms_the_times_or_contradicts_them(rate: float, said: bool) -> None:
+    found = in_seconds(
+        Channel("time", TIME, "s"), TIME.size, {"fs": 7.0}, ImportChoices(rate=rate), "log.csv"
+    )
+    assert bool(found.why) == said
+    assert all("not 7 Hz as stated" in words and "--rate 20 confirms them" in words for words in found.why)
