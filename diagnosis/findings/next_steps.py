@@ -54,7 +54,7 @@ def steps(answer: Findings) -> list[NextStep]:
     if not decided:
         return [*_deciding(answer), *runs, *model_steps(answer.model, answer), _NO_REPAIR]
     if causes == UNKNOWN:
-        first = answer.repeated.drift_steps or [_look(answer)]
+        first = [*answer.repeated.drift_steps, _look(answer)]
         return [*first, *runs, *model_steps(answer.model, answer), *_narrowing(answer)]
     meanwhile = NextStep("Until then use the coefficients with the causes, not those without")
     last = [NextStep("Do not trust the coefficients beyond their intervals", "the residual gap changes them")]
