@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from diagnosis.findings.terms import CHANNELS, among_answers, without_scatter
 from diagnosis.settings import AnswerSettings
-from identification.show.numbers import alternatives, listed, plain, probability, share
+from identification.show.numbers import alternatives, listed, plain, probability, share, significant
 from tunnel_sim.effects import BetweenRuns, known_effects
 from tunnel_sim.files.from_json import from_json_fields
 from tunnel_sim.files.writing import as_json
@@ -22,8 +22,8 @@ their mean.
 Judgement. A model that misses a tenth of the motion lacks a part of it."""
 CANCELS_FROM: Final = 2.0
 """Minimum root mean square misfit with a part of the causes, over the gap's, for the causes to cancel each other.
-Estimated. It is 1.0 at most in 83 answers of two causes and more, nearly all of them right, and 20 and 50 in two
-false answers for a stiffness that relaxes within each run. These campaigns are not an independent test."""
+Estimated. It is 1.0 at most in 58 answers of several causes in simulated campaigns, most of them right, and 21 and
+47 in two false answers for a stiffness that relaxes within each run. They are not an independent test."""
 ANSWERS_NAMED: Final = 5
 """Maximum number of likely answers in a sentence. Judgement."""
 IN_COMMON: Final = 0.9
@@ -67,7 +67,8 @@ _DOUBTS: Mapping[str, Callable[[float, str], str]] = {
     ),
     "left": lambda found, s: f"leave{s} a residual of {share(found)} of the swing on held-out readings",
     "part": lambda found, s: (
-        f"cancel{s} each other: with a part of them the misfit is {found:.2g} times the gap"
+        f"explain{s} the gap by cancelling: with a part of the causes the misfit is {significant(found, 2)} times "
+        "the gap"
     ),
     "elsewhere": lambda *_: "the residuals point elsewhere",
 }

@@ -31,7 +31,7 @@ def test_the_credible_set_is_the_smallest_with_nine_tenths():
         (Predictions(held_out=0.98, left=0.16), "leaves a residual of 16.0 % of the swing on held-out"),
         (
             Predictions(held_out=0.98, part=20.8),
-            "cancels each other: with a part of them the misfit is 21 times",
+            "explains the gap by cancelling: with a part of the causes the misfit is 21 times",
         ),
         (Predictions(held_out=0.2, ahead=0.2, patched=0.2, left=0.09, part=1.0), ""),
         (Predictions(), ""),
