@@ -31,6 +31,7 @@ def test_inertia_and_damping_are_stated_with_their_intervals(effects):
     for name, truth in (("yaw_inertia", INERTIA), ("mechanical_damping", DAMPING)):
         assert after[name].value == pytest.approx(truth, abs=4.0 * after[name].std)
         assert after[name].value == pytest.approx(truth, rel=0.01)
+        assert after[name].std < 0.01 * truth
     assert "give no coefficients" not in str(found)
 
 

@@ -19,6 +19,7 @@ from diagnosis.search.clock import StepClock
 from diagnosis.search.investigate import investigate, nominal_study
 from diagnosis.search.one_more import sets_with_one_more
 from diagnosis.search.scatter import only_drifts, scattered, with_drifts
+from diagnosis.search.sets import Sets
 from diagnosis.search.study import Study
 from diagnosis.search.views.whole_runs import WholeRuns
 from tests.marks import slow
@@ -246,6 +247,23 @@ def test_a_drift_beside_scatter_costs_less_than_scatter_as_wide(scatter: float, 
     alone = scattered(nominal_study(campaign(scatter=1.0), FEW).nominal, FEW)
     assert alone is not None
     assert with_drifts(alone) is None
+
+
+@pytest.mark.parametrize("scatter", [0.0, 1.0])
+def test_a_drift_has_one_price_with_an_effect_and_without(scatter: float) -> None:
+    """Otherwise an effect is bought by scatter as wide as the drift."""
+    view = WholeRuns.of(nominal_study(campaign(scatter=scatter, drift=0.2), FEW).prepared)._differing(None)
+    none = view.smallest
+    (cubic,) = sets_with_one_more([none], vocabulary(["cubic_stiffness"]))
+    sets = Sets(view, (none, cubic))
+    alone, beside = sets._fitted_set(none), sets._fitted_set(cubic)
+    precision = view.gap.deviation_precision
+    assert alone.scatter_cost < none.fit.scatter_cost(precision) - 6.0
+    assert beside.scatter_cost < cubic.fit.scatter_cost(precision) - 6.0
+    assert beside.scatter_cost == pytest.approx(alone.scatter_cost, abs=6.0)
+    assert alone.outside == (scatter == 0.0)
+    assert not beside.outside
+    assert sets.weighed[0].effects != ("cubic_stiffness",)
 
 
 def test_a_run_far_beyond_the_others_is_an_outlier() -> None:
