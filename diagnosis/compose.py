@@ -160,7 +160,7 @@ def composed(
     similarity, fitted, cycling = study.similarity, study.chosen, chosen.limit_cycles
     begun = time.perf_counter()
     where, maps, place = localise(study, closes.gap.closed)
-    named = _named(study, chosen, closes, patched, (where, place))
+    named = _named(answered, chosen, patched, (where, place))
     seconds = {**study.seconds, **closes.seconds, "coefficients": time.perf_counter() - begun}
     if cycling:
         named = _cycling(closes.gap, chosen.remarks, study.settings.answer)
@@ -322,13 +322,13 @@ def _friction(study: Study) -> FrictionCurve | None:
 
 
 def _named(
-    study: Study,
+    answered: Confirmed,
     chosen: Chosen,
-    closes: Closing,
     patched: PatchedModel | None,
     located: tuple[Where, PlaceFound | Nowhere],
 ) -> _Named:
     """The causes with their probabilities and coefficients, and whether the answer is decided."""
+    study, closes = answered.study, answered.closes
     similarity, rig, settings = study.similarity, study.campaign.rig, study.settings
     where, place = located
     weighed = candidates(study, excess_base(study), parameter_errors(study, closes))
@@ -351,7 +351,7 @@ def _named(
         decision=decision(
             [(one.effect, one.probability) for one in weighed],
             settings.answer,
-            _predictions(closes, patched, place, settings.answer),
+            _predictions(answered, patched, place, settings.answer),
         ),
         coefficients=Coefficients(
             own_estimates(sized["before"], similarity),
@@ -383,10 +383,11 @@ def _cycling(gap: GapSummary, remarks: Sequence[Remark], chosen: AnswerSettings)
 
 
 def _predictions(
-    closes: Closing, patched: PatchedModel | None, place: PlaceFound | Nowhere, chosen: AnswerSettings
+    answered: Confirmed, patched: PatchedModel | None, place: PlaceFound | Nowhere, chosen: AnswerSettings
 ) -> Predictions:
     """The success of the answer's predictions."""
-    gap = closes.gap
+    closes, repeats = answered.closes, answered.repeats
+    gap, patterns = closes.gap, () if repeats is None else repeats.trends
     return Predictions(
         held_out=gap.closed,
         ahead=gap.closed_ahead,
@@ -394,6 +395,7 @@ def _predictions(
         under_load=None if patched is None else patched.under_load(chosen),
         left=gap.misfit.of_swing(gap.excess_after),
         part=closes.steps.of_a_part,
+        pattern=max((abs(one.change) for one in patterns if one.of_condition), default=None),
         elsewhere=isinstance(place, PlaceFound) and place.elsewhere,
     )
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from scipy.special import fdtrc, ndtri, stdtr
+from scipy.special import fdtrc, ndtri
 
 from diagnosis.likelihood.least_squares import Fit, scaled_residuals
 from diagnosis.likelihood.residuals import linear_coefficients
@@ -15,7 +15,6 @@ from diagnosis.likelihood.scatter_widths import ScatterColumns, width_prior
 from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.model.chance import Scatter
 from diagnosis.search.scatter import (
-    drifts,
     may_scatter,
     may_show,
     usual,
@@ -30,7 +29,6 @@ from identification.campaign.random_effects import (
     width_quantiles,
 )
 from tunnel_sim.effects import ALL_EFFECTS
-from tunnel_sim.vocabulary.quantities import PerRun
 from tunnel_sim.vocabulary.record import Array
 
 LIMIT_TOLD: Final = 0.5
@@ -57,30 +55,6 @@ class Spread:
     stated: float | None
     shown: bool
     deviations: dict[str, float]
-
-
-@dataclass(frozen=True)
-class Trend:
-    """A quantity that differs between the runs by a pattern: in their order, or with a condition of the plan.
-
-    Args:
-        effect: name of the quantity's scatter.
-        change: relative change of the quantity from the first run to the last, or from the least value of the
-            condition to the greatest, dimensionless.
-        std: standard deviation of the change, dimensionless.
-        p_value: probability of such a pattern by chance, times the number of patterns tested.
-        left: standard deviation of the runs' deviations from the trend, relative, dimensionless.
-        only: whether the runs show no scatter of the quantity beside the trend.
-        along: ``order``, ``spring_stiffness``, ``wind_speed``, ``air_density`` or ``amplitude``.
-    """
-
-    effect: str
-    change: float
-    std: float
-    p_value: float
-    left: float
-    only: bool = False
-    along: str = "order"
 
 
 @dataclass(frozen=True)
@@ -138,10 +112,7 @@ _CENTRAL = (0.05, 0.5, 0.95)  # levels of the quantiles
 _AT_MOST = 0.95  # level of a limit
 _COMPARED = ("spring_stiffness", "mechanical_damping")  # a run's own deviations
 _NUMBERS = len(_COMPARED)  # number of a run's deviations
-_FEWEST = 5  # minimum number of runs for an outlier or a drift
-_FEWEST_OF_PATTERN = 4  # minimum number of runs for a pattern of the plan
-_PATTERN = 0.05  # relative range of a condition that makes a pattern
-_OF_TREND = 2  # number of parameters of a straight line
+_FEWEST = 5  # minimum number of runs for an outlier
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,66 +213,6 @@ class RunDeviations:
         told = widths <= LIMIT_TOLD * unseen
         frequency, damping = (float(size) if known else None for size, known in zip(sizes, told, strict=True))
         return ScatterLimits(frequency, damping)
-
-    def trends(self) -> tuple[Trend, ...]:
-        """Parameters that differ between the runs and follow their order, or a condition of the plan.
-
-        The trend is a further common parameter: a run's own stiffness and damping change in proportion to its
-        place in the campaign, or to the condition. Widths are fitted together with the trend.
-        """
-        places = [place for place in self.kept if self.scatter[place].shown]
-        rate = self.fitted.settings.scatter.trend_rate
-        clearest = []
-        for place in places:
-            patterns = self._patterns(place)
-            tried = len(places) * len(patterns)
-            found = [self._trend(place, along, values, tried) for along, values in patterns.items()]
-            known = [one for one in found if one is not None and one.p_value < rate]
-            clearest += [min(known, key=lambda one: one.p_value)] if known else []
-        return tuple(clearest)
-
-    def _patterns(self, place: int) -> dict[str, PerRun | None]:
-        """Quantities that the deviations of one parameter may follow, from -1/2 to 1/2; None for the order."""
-        data = self.fitted.problem.data
-        runs, acts = data.runs, data.acts(self.scatter[place].kind)
-        known = {
-            "spring_stiffness": [run.spring_stiffness or 0.0 for run in runs],
-            "wind_speed": [run.wind_speed for run in runs],
-            "air_density": [run.air_density for run in runs],
-            "amplitude": [0.5 * float(np.ptp(run.reading)) for run in runs],
-        }
-        found: dict[str, PerRun | None] = {"order": None}
-        for name, given in known.items():
-            values = np.array(given)
-            has = (
-                acts & (values > 0.0) if name == "air_density" else acts
-            )  # without wind no air density is stated
-            low, high = float(values[has].min(initial=np.inf)), float(values[has].max(initial=0.0))
-            if high - low > _PATTERN * high:
-                found[name] = np.where(has, (values - low) / (high - low) - 0.5, 0.0)
-        return found
-
-    def _trend(self, place: int, along: str, values: PerRun | None, tried: int) -> Trend | None:
-        """The trend of one parameter; None where too few runs have it."""
-        kind = self.scatter[place].kind
-        count = int(self.fitted.problem.data.acts(kind).sum())
-        if count < (_FEWEST if values is None else _FEWEST_OF_PATTERN):
-            return None
-        columns, size = self.columns.with_drift(place, values)
-        products = RunProducts.of(
-            [one[:, self.kept] for one in columns.deviations], columns.common, columns.residuals
-        )
-        widths = likeliest_widths(products, self.prior)
-        beside = marginal(products, widths)
-        slope, std = beside.common[-1] / size, float(np.sqrt(beside.covariance[-1, -1])) / size
-        if std <= 0.0:  # only the common parameters change along the campaign
-            return None
-        # only the runs determine the width
-        p_value = min(1.0, tried * 2.0 * float(stdtr(count - _OF_TREND, -abs(slope) / std)))
-        left = float(widths[list(self.kept).index(place)])
-        known = [one.name for one in self.fitted.problem.scatter]
-        only = values is None and kind.name in known and drifts(self.fitted, known.index(kind.name))
-        return Trend(kind.name, float(slope), std, p_value, left, only, along)
 
     def _changes(self, index: int) -> Array:
         """Changes of a run's stiffness and damping by a unit of every difference, shape (differences, 2)."""

@@ -35,8 +35,8 @@ class Doubt:
     """A prediction by which a probable answer fails.
 
     Args:
-        kind: ``held out``, ``ahead``, ``patched``, ``under load``, ``left``, ``part`` or ``elsewhere``, as in
-            `Predictions`.
+        kind: ``held out``, ``ahead``, ``patched``, ``under load``, ``left``, ``part``, ``pattern`` or
+            ``elsewhere``, as in `Predictions`.
         share: the share found, a fraction; None for a doubt about the place.
     """
 
@@ -70,6 +70,9 @@ _DOUBTS: Mapping[str, Callable[[float, str], str]] = {
         f"explain{s} the gap by cancelling: with a part of the causes the misfit is {significant(found, 2)} times "
         "the gap"
     ),
+    "pattern": lambda found, s: (
+        f"leave{s} a difference of {share(found)} between the runs that follows a condition of the plan"
+    ),
     "elsewhere": lambda *_: "the residuals point elsewhere",
 }
 """Reasons for not deciding on the best-fitting answer, by kind, from the share found and the ending of the verb."""
@@ -86,6 +89,7 @@ class Predictions:
         under_load: share of the gap that remains with friction that depends on an actuator's load.
         left: root mean square residual over the readings' root mean square about their mean, a ratio.
         part: largest root mean square misfit with a part of the causes, over the gap's, a ratio.
+        pattern: largest relative difference between the runs that follows a condition of the plan, a fraction.
         elsewhere: whether the residuals show a place at which no cause of the answer acts.
     """
 
@@ -95,6 +99,7 @@ class Predictions:
     under_load: float | None = None
     left: float | None = None
     part: float | None = None
+    pattern: float | None = None
     elsewhere: bool = False
 
     def doubts(self) -> tuple[Doubt, ...]:
@@ -111,6 +116,8 @@ class Predictions:
             found.append(Doubt("left", self.left))
         if self.part is not None and self.part > CANCELS_FROM:
             found.append(Doubt("part", self.part))
+        if self.pattern is not None:
+            found.append(Doubt("pattern", self.pattern))
         if self.elsewhere:
             found.append(Doubt("elsewhere", None))
         return tuple(found)
@@ -140,6 +147,11 @@ class Decision:
     def in_doubt_of_place(self) -> bool:
         """Whether the residuals show a place at which the causes of the answer do not act."""
         return any(one.kind == "elsewhere" for one in self.doubts)
+
+    @property
+    def in_doubt_of_pattern(self) -> bool:
+        """Whether the differences between the runs follow a condition of the plan."""
+        return any(one.kind == "pattern" for one in self.doubts)
 
     def words(self, runs: str) -> str:
         """Sentences on an undecided diagnosis: the common part of its answers and the alternatives.

@@ -54,7 +54,7 @@ def steps(answer: Findings) -> list[NextStep]:
     if not decided:
         return [*_deciding(answer), *runs, *model_steps(answer.model, answer), _NO_REPAIR]
     if causes == UNKNOWN:
-        first = [*answer.repeated.drift_steps, _look(answer)]
+        first = [*answer.repeated.pattern_steps, _look(answer)]
         return [*first, *runs, *model_steps(answer.model, answer), *_narrowing(answer)]
     meanwhile = NextStep("Until then use the coefficients with the causes, not those without")
     last = [NextStep("Do not trust the coefficients beyond their intervals", "the residual gap changes them")]
@@ -243,6 +243,8 @@ def _deciding(answer: Findings) -> Iterator[NextStep]:
             f"Look at {runs} where the residuals point (Where), before any cause",
             "the likeliest cause acts elsewhere",
         )
+    if answer.decision.in_doubt_of_pattern:
+        yield from answer.repeated.pattern_steps
     run, robot = run_to_make(answer), answer.found.robot
     if run is not None:
         yield NextStep(

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from diagnosis.answer.run_deviations import RunDeviations, RunRepeat, ScatterLimits, Spread, Trend
+from diagnosis.answer.run_deviations import RunDeviations, RunRepeat, ScatterLimits, Spread
 from diagnosis.findings.finding import Judged, NextStep, Picture
 from diagnosis.findings.terms import NUMBERS, SCATTERS, scattering, without_scatter
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.search.answer import UNKNOWN
+from diagnosis.search.patterns import Trend, trends
 from identification.show.blocks import TextTable
 from identification.show.drawing import AFTER, BEFORE, INK, NARROW, NOISE, PAPER
 from identification.show.numbers import concise, listed, percent_of, plain, probability, rounded_up, with_std
@@ -103,7 +104,7 @@ class RunRepeatability:
         rate = fitted.settings.scatter.outlier_rate
         outliers = sorted((one for one in runs if one.p_value < rate), key=lambda one: one.p_value)
         outlier = outliers[0].id if outliers else ""
-        return cls(found.spreads(), runs, outlier, found.trends(), limits=found.limits())
+        return cls(found.spreads(), runs, outlier, trends(fitted), limits=found.limits())
 
     @property
     def scatters(self) -> bool:
@@ -171,7 +172,8 @@ class RunRepeatability:
 
     def _start(self, judged: Judged) -> str:
         if not judged.decided:
-            return "With every answer the runs differ from each other by chance"
+            by = ", and not by chance alone" if self.trends else " by chance"
+            return f"With every answer the runs differ from each other{by}"
         if without_scatter(judged.causes):
             return "In addition the runs differ by chance"
         likely = probability(judged.likely)
@@ -229,10 +231,16 @@ class RunRepeatability:
         return NextStep(_sought(trend), "most of the difference between runs follows it")
 
     @property
-    def drift_steps(self) -> list[NextStep]:
-        """The steps where the runs differ by drifts alone."""
-        drifts = [one for one in self.trends if one.only]
-        return [NextStep(_sought(one), "the runs differ by nothing else") for one in drifts]
+    def pattern_steps(self) -> list[NextStep]:
+        """The steps where the differences between the runs have a cause that is not named."""
+        return [
+            NextStep(
+                _sought(one),
+                "the runs differ by nothing else" if one.only else "such a difference has a cause",
+            )
+            for one in self.trends
+            if one.only or one.of_condition
+        ]
 
     def steps(self, judged: Judged) -> list[NextStep]:
         """Next steps for an outlying run, and for poorly distinguished quantities."""
@@ -306,9 +314,15 @@ class RunRepeatability:
 
 
 def _sought(trend: Trend) -> str:
-    """The search for the cause of a trend between the runs."""
-    along = _ALONG.get(trend.along)
-    course = "from the first run to the last" if along is None else f"with the {along}"
+    """The search for the cause of a pattern."""
+    if trend.along == "order":
+        course = "from the first run to the last"
+    elif trend.along == "wind":
+        course = "with the wind on"
+    elif trend.along == "groups":
+        course = f"in {listed(list(trend.runs))}"
+    else:
+        course = f"with the {_ALONG[trend.along]}"
     return f"Look for what makes {NUMBERS[SCATTERS[trend.effect]]} differ {course}"
 
 
@@ -336,24 +350,27 @@ def _differs(spread: Spread, trends: Mapping[str, Trend]) -> str:
 
 
 def trend_words(trend: Trend) -> str:
-    """The drift of a quantity over the campaign, in a sentence."""
-    number = SCATTERS[trend.effect]
-    change, std = 100.0 * abs(trend.change), 100.0 * trend.std
-    goes = "rises" if trend.change > 0.0 else "falls"
-    moved = f"{NUMBERS[number]} {goes} by {with_std(change, std)} % from the first to the last run"
-    along = trend.along
-    if along != "order":
-        moved = f"{with_std(change, std)} % {'higher' if trend.change > 0.0 else 'lower'}"
-        return (
-            f"Part of this is not by chance: {NUMBERS[number]} is {moved} at the greatest {_ALONG[along]} than at "
-            f"the least. The remaining scatter is {percent_of(trend.left)}."
-        )
+    """The pattern that a quantity follows, in a sentence."""
+    number, drifts = SCATTERS[trend.effect], trend.along == "order"
+    change, rises = with_std(100.0 * abs(trend.change), 100.0 * trend.std), trend.change > 0.0
+    if drifts:
+        goes = "rises" if rises else "falls"
+        differs = f"{NUMBERS[number]} {goes} by {change} % from the first to the last run ({_DRIFTS[number]})"
+    else:
+        differs = f"{NUMBERS[number]} is {change} % {'higher' if rises else 'lower'} {_compared(trend)}"
     if trend.only:
-        return f"The runs drift but do not scatter: {moved} ({_DRIFTS[number]})."
-    return (
-        f"Part of this is a drift: {moved} ({_DRIFTS[number]}). "
-        f"The remaining scatter is {percent_of(trend.left)}."
-    )
+        return f"The runs {'drift' if drifts else 'differ'} but do not scatter: {differs}."
+    start = "Part of this is a drift" if drifts else "Part of this is not by chance"
+    return f"{start}: {differs}. The remaining scatter is {percent_of(trend.left)}."
+
+
+def _compared(trend: Trend) -> str:
+    """The runs in which a quantity is higher or lower, and those with which they are compared."""
+    if trend.along == "wind":
+        return "with the wind on than with the wind off"
+    if trend.along == "groups":
+        return f"in {listed(list(trend.runs))} than in the other runs"
+    return f"at the greatest {_ALONG[trend.along]} than at the least"
 
 
 def _ratio(interval: Sequence[float]) -> float:

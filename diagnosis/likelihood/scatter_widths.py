@@ -7,7 +7,7 @@ are integrated out (`identification.campaign.random_effects`).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 
@@ -111,18 +111,17 @@ class ScatterColumns:
         rows = zip(self.residuals, self.common, self.deviations, found.deviations, strict=True)
         return [z - j @ found.common - d @ e for z, j, d, e in rows]
 
-    def with_drift(self, place: int, along: PerRun | None = None) -> tuple[ScatterColumns, float]:
-        """Add a drift: a deviation of one parameter in proportion to a run's place in the campaign.
+    def with_pattern(self, place: int, values: PerRun) -> tuple[ScatterColumns, float]:
+        """Add a pattern: a deviation of one parameter in proportion to given values.
 
         Args:
             place: of the parameter among the deviations.
-            along: another quantity that replaces the run's place, from -1/2 to 1/2, shape (runs,).
+            values: of every run, from -1/2 to 1/2, shape (runs,), dimensionless.
 
         Returns:
-            The columns, and the norm of the column for a drift of 1 from the first run to the last.
+            The columns, and the norm of the column for a deviation of 1 from -1/2 to 1/2.
         """
-        order = np.linspace(-0.5, 0.5, len(self.residuals)) if along is None else along
-        return self.with_column([t * own[:, place] for t, own in zip(order, self.deviations, strict=True)])
+        return self.with_column([t * own[:, place] for t, own in zip(values, self.deviations, strict=True)])
 
     def likeliest(self, prior: WidthPrior, start: PerKind | None = None) -> Between:
         """The most likely widths, and the runs with them."""
@@ -133,6 +132,17 @@ class ScatterColumns:
         starts = {0, int(np.argmin(restricted_costs(self.products, prior, tries)))}
         ends = (likeliest_widths(self.products, prior, tries[one]) for one in sorted(starts))
         return min((self.at(widths, prior) for widths in ends), key=lambda one: one.restricted)
+
+    def gain(self, prior: WidthPrior, kept: Kept, lost: Kept) -> float:
+        """Drop of −2 ln L by some of the differences beside the remaining ones, dimensionless.
+
+        Args:
+            kept: all differences compared, shape (kinds,); the others keep their least widths.
+            lost: differences among them that the likelihood is compared without, shape (kinds,).
+        """
+        whole = self.likeliest(_at_least(prior, ~kept))
+        without = self.likeliest(_at_least(prior, ~kept | lost))
+        return without.likeliest.restricted - whole.likeliest.restricted
 
     def wider(self, prior: WidthPrior, widths: PerKind) -> float:
         """P-value of the observed differences if the given widths are true, by the likelihood ratio."""
@@ -209,6 +219,12 @@ class Between:
             given = given & (np.diag(one.covariance) > 0.0)
         information = self.likeliest.log_information_given(given) - self.most.log_information_given(given)
         return width + self.prior_cost + information
+
+
+def _at_least(prior: WidthPrior, which: Kept) -> WidthPrior:
+    """The prior with some widths fixed at their least."""
+    usual, decades = np.where(which, prior.least, prior.usual), np.where(which, 0.0, prior.decades)
+    return replace(prior, usual=usual, decades=decades)
 
 
 def _orthonormal(columns: Array) -> Array:

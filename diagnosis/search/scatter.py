@@ -35,7 +35,6 @@ of 16 only."""
 
 _ROUNDS = 3  # rounds of widths and fits
 _REPEATING = 8  # iterations of a fit to runs that repeat, which starts close
-_IN_ORDER = 5  # minimum number of runs that show an order
 
 _TOLERANCE = 1e-7  # drop of χ², as a share of χ², at which the answer's fit has converged
 
@@ -218,58 +217,12 @@ def _shown(columns: ScatterColumns, prior: WidthPrior, chosen: ScatterSettings) 
     varying = np.ones(prior.usual.size, bool)
     while varying.sum() > 1:
         places = np.flatnonzero(varying)
-        gains = [_gain(columns, prior, varying, np.arange(varying.size) == place) for place in places]
+        gains = [columns.gain(prior, varying, np.arange(varying.size) == place) for place in places]
         least = int(np.argmin(gains))
         if gains[least] >= chdtri(1.0, chosen.which_scatters_rate):
             break
         varying[places[least]] = False
     return varying
-
-
-def with_drifts(fitted: Fit) -> Between | None:
-    """The differences between the runs of a fit beside drifts in their order; None where the runs show no drift."""
-    scatter, chosen = fitted.problem.scatter, fitted.settings.scatter
-    if not scatter or len(fitted.residuals) < _IN_ORDER:
-        return None
-    columns, prior = fitted.columns, width_prior(fitted.problem)
-    if not _evident(columns, prior, np.ones(len(scatter), bool), chosen):
-        return None
-    drifting = [
-        int(place)
-        for place in np.flatnonzero(_shown(columns, prior, chosen))
-        if _gain_of_drift(columns, prior, int(place)) > chdtri(1.0, chosen.trend_rate)
-    ]
-    for place in drifting:
-        columns, _ = columns.with_drift(place)
-    return columns.likeliest(prior) if drifting else None
-
-
-def only_drifts(fitted: Fit) -> bool:
-    """Whether the runs of a fit differ, and only by drifts in their order. Such differences are not scatter."""
-    if with_drifts(fitted) is None:
-        return False
-    shown = _shown(fitted.columns, width_prior(fitted.problem), fitted.settings.scatter)
-    return all(drifts(fitted, int(place)) for place in np.flatnonzero(shown))
-
-
-def drifts(fitted: Fit, place: int) -> bool:
-    """Whether the runs differ in one quantity in proportion to their place, and in no other.
-
-    Args:
-        place: place of the quantity among those that differ in the fit.
-    """
-    columns, prior, chosen = fitted.columns, width_prior(fitted.problem), fitted.settings.scatter
-    beside, _ = columns.with_drift(place)
-    gain = _gain_of_drift(columns, prior, place)
-    all_of_them = np.ones(prior.usual.size, bool)
-    left = _gain(beside, prior, all_of_them, np.arange(prior.usual.size) == place)
-    return bool(gain > chdtri(1.0, chosen.trend_rate) and left < chdtri(1.0, chosen.which_scatters_rate))
-
-
-def _gain_of_drift(columns: ScatterColumns, prior: WidthPrior, place: int) -> float:
-    """Drop of −2 ln L by a drift of one quantity in the order of the runs."""
-    beside, _ = columns.with_drift(place)
-    return columns.likeliest(prior).likelihood - beside.likeliest(prior).likelihood
 
 
 def with_scatter(fitted: Fit, scatter: Scatter) -> Fit:
@@ -288,20 +241,7 @@ def named(fitted: Fit) -> tuple[str, ...]:
 def _evident(columns: ScatterColumns, prior: WidthPrior, which: Kept, chosen: ScatterSettings) -> bool:
     """Whether the runs differ by more than the least widths."""
     limit = chdtri(float(which.sum()), chosen.scatter_rate)
-    return bool(_gain(columns, prior, np.ones_like(which), which) >= limit)
-
-
-def _gain(columns: ScatterColumns, prior: WidthPrior, kept: Kept, lost: Kept) -> float:
-    """Drop of −2 ln L by some of the differences beside the remaining ones."""
-    whole = columns.likeliest(_held(prior, ~kept))
-    without = columns.likeliest(_held(prior, ~kept | lost))
-    return without.likeliest.restricted - whole.likeliest.restricted
-
-
-def _held(prior: WidthPrior, at_least: Kept) -> WidthPrior:
-    """The prior with some widths fixed at their least."""
-    usual, decades = np.where(at_least, prior.least, prior.usual), np.where(at_least, 0.0, prior.decades)
-    return replace(prior, usual=usual, decades=decades)
+    return bool(columns.gain(prior, np.ones_like(which), which) >= limit)
 
 
 def with_likeliest_widths(fitted: Fit, *, rounds: int = _ROUNDS) -> Fit:

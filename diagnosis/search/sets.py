@@ -18,9 +18,10 @@ from diagnosis.search.answer import UNKNOWN, Answer
 from diagnosis.search.clock import StepClock
 from diagnosis.search.hypothesis import Hypothesis, with_forms
 from diagnosis.search.one_more import same_change, sets_with_one_more
+from diagnosis.search.patterns import has_a_cause, with_drifts
 from diagnosis.search.rivals.rival import FoundRival, Rival
 from diagnosis.search.runs_in_view import RunsInView
-from diagnosis.search.scatter import only_drifts, with_drifts, with_scatter
+from diagnosis.search.scatter import with_scatter
 from diagnosis.search.surviving import refusal
 from diagnosis.search.weigh import weigh
 from diagnosis.search.weights import FittedSet
@@ -78,9 +79,9 @@ class Sets:
         """The set as input of the weighing.
 
         A drift in the order of the runs is neither scatter nor an effect of the vocabulary. Beside any set it costs
-        as much as an effect; where the runs differ by a drift alone, its cause is unknown.
+        as much as an effect. Where the runs differ by patterns alone, or with a condition, the cause is unknown.
         """
-        outside = not one.effects and only_drifts(one.fit)
+        outside = not one.effects and has_a_cause(one.fit)
         found = one.fitted_set(self.view.repeating, self.view.gap, outside=outside)
         drifting = with_drifts(one.fit)
         if drifting is None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.answer.run_deviations import ScatterLimits, Spread, Trend
+from diagnosis.answer.run_deviations import ScatterLimits, Spread
 from diagnosis.findings.cautions import CAUTIONS, sentence_of
 from diagnosis.findings.judgements import zeros_apart
 from diagnosis.findings.repeatability import RunRepeatability
@@ -16,6 +16,7 @@ from diagnosis.likelihood.least_squares import fit_at
 from diagnosis.model.parameters import Point
 from diagnosis.model.similarity import Similarity
 from diagnosis.search.investigate import nominal_study
+from diagnosis.search.patterns import Trend
 from diagnosis.search.scatter import evident, scattered, shown_by
 from tests.support.gap_campaigns import campaign, nominal, studied
 from tunnel_sim.effects import ALL_EFFECTS

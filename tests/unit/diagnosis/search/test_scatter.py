@@ -18,7 +18,8 @@ from diagnosis.findings.next_steps import next_steps
 from diagnosis.search.clock import StepClock
 from diagnosis.search.investigate import investigate, nominal_study
 from diagnosis.search.one_more import sets_with_one_more
-from diagnosis.search.scatter import only_drifts, scattered, with_drifts
+from diagnosis.search.patterns import has_a_cause, with_drifts
+from diagnosis.search.scatter import scattered
 from diagnosis.search.sets import Sets
 from diagnosis.search.study import Study
 from diagnosis.search.views.whole_runs import WholeRuns
@@ -239,7 +240,7 @@ def test_a_drift_beside_scatter_costs_less_than_scatter_as_wide(scatter: float, 
     layered = scattered(fitted, FEW)
     assert layered is not None
     beside, between = with_drifts(layered), layered.between
-    assert only_drifts(layered) == only
+    assert has_a_cause(layered) == only
     assert beside is not None
     assert between is not None
     precision = layered.columns.products.own

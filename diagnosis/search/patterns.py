@@ -1,0 +1,204 @@
+"""Patterns in the differences between runs: their order, a condition of the plan, or two groups of runs.
+
+A difference that follows a pattern has a cause, so it is not scatter
+(docs/decisions/0036-runs-that-do-not-repeat.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.special import chdtri, stdtr
+
+from diagnosis.likelihood.least_squares import Fit
+from diagnosis.likelihood.scatter_widths import Between, width_prior
+from diagnosis.search.scatter import shown_by
+from identification.campaign.random_effects import marginal
+from tunnel_sim.vocabulary.quantities import PerRun
+
+IN_ORDER: Final = 5
+"""Minimum number of runs that show a drift in their order. Judgement."""
+OF_CONDITION: Final = 4
+"""Minimum number of runs that show a difference with a condition of the plan. Judgement."""
+OF_GROUPS: Final = 6
+"""Minimum number of runs that show two groups. Judgement. The partitions of fewer runs leave no small p-value."""
+CONDITION_RANGE: Final = 0.05
+"""Minimum relative range of a condition for the runs to be compared along it. Convention."""
+
+_ORDER, _GROUPS = "order", "groups"
+_OF_LINE = 2  # number of parameters of a straight line
+
+
+@dataclass(frozen=True, eq=False)
+class Pattern:
+    """A pattern that the deviations of one quantity may follow.
+
+    Args:
+        along: as in `Trend`.
+        values: of every run, from -1/2 to 1/2; 0 where the quantity does not act; shape (runs,), dimensionless.
+        tried: number of patterns from which this one is chosen, at least 1.
+        runs: ids of the runs of the named group; empty for other patterns.
+    """
+
+    along: str
+    values: PerRun
+    tried: float = 1.0
+    runs: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Trend:
+    """A quantity that differs between the runs by a pattern.
+
+    Args:
+        effect: name of the quantity's scatter.
+        change: relative change of the quantity from the first run to the last, from the least value of the
+            condition to the greatest, or from the other runs to the named group, dimensionless.
+        std: standard deviation of the change, dimensionless.
+        p_value: probability of such a pattern by chance, times the number of patterns tested.
+        left: standard deviation of the runs' deviations from the trend, relative, dimensionless.
+        only: whether the runs show no scatter of the quantity beside the trend.
+        along: ``order``, ``spring_stiffness``, ``wind_speed``, ``air_density``, ``amplitude``, ``wind`` (on
+            against off) or ``groups``.
+        runs: ids of the runs of the named group; empty for other patterns.
+    """
+
+    effect: str
+    change: float
+    std: float
+    p_value: float
+    left: float
+    only: bool = False
+    along: str = _ORDER
+    runs: tuple[str, ...] = ()
+
+    @property
+    def of_condition(self) -> bool:
+        """Whether the quantity follows a condition that the model knows: the model then lacks a cause."""
+        return self.along not in (_ORDER, _GROUPS)
+
+
+def trends(fitted: Fit) -> tuple[Trend, ...]:
+    """The patterns that the differences between the runs of a fit follow, beyond chance.
+
+    Returns:
+        For every difference that the runs show at most one: the clearest.
+    """
+    shown, clearest = shown_by(fitted), []
+    for place, one in enumerate(fitted.problem.scatter):
+        if one.name not in shown:
+            continue
+        compared = list(_patterns(fitted, place))
+        tried = [_trend(fitted, place, pattern, len(shown) * len(compared)) for pattern in compared]
+        known = [trend for trend in tried if trend is not None]
+        clearest += [min(known, key=lambda trend: trend.p_value)] if known else []
+    return tuple(clearest)
+
+
+def with_drifts(fitted: Fit) -> Between | None:
+    """The differences between the runs of a fit beside drifts in their order; None where the runs show no drift."""
+    columns, scatter = fitted.columns, fitted.problem.scatter
+    shown, order = shown_by(fitted), Pattern(_ORDER, _order(len(fitted.problem.data.runs)))
+    drifting = [
+        place
+        for place, one in enumerate(scatter)
+        if one.name in shown and _trend(fitted, place, order, len(shown)) is not None
+    ]
+    for place in drifting:
+        columns, _ = columns.with_pattern(place, order.values)
+    return columns.likeliest(width_prior(fitted.problem)) if drifting else None
+
+
+def has_a_cause(fitted: Fit) -> bool:
+    """Whether the differences between the runs of a fit are not scatter.
+
+    Each of them is a pattern alone, or one of them follows a condition that the model knows.
+    """
+    found = {trend.effect: trend for trend in trends(fitted)}
+    alone = [name in found and found[name].only for name in shown_by(fitted)]
+    return any(trend.of_condition for trend in found.values()) or (bool(alone) and all(alone))
+
+
+def _order(count: int) -> PerRun:
+    return np.linspace(-0.5, 0.5, count)
+
+
+def _patterns(fitted: Fit, place: int) -> Iterator[Pattern]:
+    """The patterns that the deviations of one quantity may follow."""
+    data = fitted.problem.data
+    runs, acts = data.runs, data.acts(fitted.problem.scatter[place].kind)
+    conditions = {
+        "spring_stiffness": [run.spring_stiffness or 0.0 for run in runs],
+        "wind_speed": [run.wind_speed for run in runs],
+        "air_density": [run.air_density for run in runs],
+        "amplitude": [0.5 * float(np.ptp(run.reading)) for run in runs],
+        "wind": [float(run.wind_on) for run in runs],
+    }
+    yield Pattern(_ORDER, _order(len(runs)))
+    known: list[PerRun] = []
+    for along, given in conditions.items():
+        values = np.array(given)
+        # without wind no air density is stated
+        has = acts & (values > 0.0) if along == "air_density" else acts
+        low, high = float(values[has].min(initial=np.inf)), float(values[has].max(initial=0.0))
+        if high - low > CONDITION_RANGE * high:
+            scaled = np.where(has, (values - low) / (high - low) - 0.5, 0.0)
+            if not any(np.array_equal(scaled, other) for other in known):
+                yield Pattern(along, scaled)
+            known.append(scaled)
+    groups = _two_groups(fitted, place, acts)
+    if groups is not None and not any(np.array_equal(np.abs(groups.values), np.abs(one)) for one in known):
+        yield groups
+
+
+def _two_groups(fitted: Fit, place: int, acts: np.ndarray) -> Pattern | None:
+    """The runs parted in two groups by the largest step of their deviations; None for too few runs.
+
+    A single run that stands apart is an outlier and no group. Every partition counts as a pattern tried.
+    """
+    where = np.flatnonzero(acts)
+    if where.size < OF_GROUPS:
+        return None
+    own = marginal(fitted.columns.products, width_prior(fitted.problem).most).deviations[where, place]
+    ranked = where[np.argsort(own)]
+    steps = np.diff(np.sort(own))[1:-1]  # at least two runs in a group
+    lower = ranked[: int(np.argmax(steps)) + 2]
+    upper = ranked[lower.size :]
+    named, others = (lower, upper) if lower.size < upper.size else (upper, lower)
+    values = np.zeros(acts.size)
+    values[named], values[others] = 0.5, -0.5
+    ids = tuple(fitted.problem.data.runs[index].id for index in sorted(named.tolist()))
+    return Pattern(_GROUPS, values, 2.0 ** (where.size - 1) - 1.0, ids)
+
+
+def _trend(fitted: Fit, place: int, pattern: Pattern, tried: int) -> Trend | None:
+    """The trend of one quantity along a pattern; None where chance explains it, or too few runs have it.
+
+    The trend is a further common parameter. Widths are fitted together with it.
+
+    Args:
+        tried: number of tests, beside the patterns from which this one is chosen.
+    """
+    scatter, chosen = fitted.problem.scatter, fitted.settings.scatter
+    count = int(fitted.problem.data.acts(scatter[place].kind).sum())
+    if count < (IN_ORDER if pattern.along == _ORDER else OF_CONDITION):
+        return None
+    columns, size = fitted.columns.with_pattern(place, pattern.values)
+    prior = width_prior(fitted.problem)
+    between = columns.likeliest(prior)
+    beside = between.likeliest
+    slope, std = beside.common[-1] / size, float(np.sqrt(beside.covariance[-1, -1])) / size
+    if std <= 0.0:  # only the common parameters change along the campaign
+        return None
+    # only the runs determine the width
+    p_value = min(1.0, tried * pattern.tried * 2.0 * float(stdtr(count - _OF_LINE, -abs(slope) / std)))
+    if p_value >= chosen.trend_rate:
+        return None
+    every = np.ones(len(scatter), bool)
+    remaining = columns.gain(prior, every, np.arange(every.size) == place)
+    only = remaining < chdtri(1.0, chosen.which_scatters_rate)
+    name, left = scatter[place].name, float(between.widths[place])
+    return Trend(name, float(slope), std, p_value, left, bool(only), pattern.along, pattern.runs)
