@@ -71,7 +71,8 @@ _DOUBTS: Mapping[str, Callable[[float, str], str]] = {
         "the gap"
     ),
     "pattern": lambda found, s: (
-        f"leave{s} a difference of {share(found)} between the runs that follows a condition of the plan"
+        f"leave{s} a difference of {significant(100.0 * found, 2)} % between the runs that follows a condition of "
+        "the plan"
     ),
     "elsewhere": lambda *_: "the residuals point elsewhere",
 }

@@ -368,9 +368,12 @@ def _compared(trend: Trend) -> str:
     """The runs in which a quantity is higher or lower, and those with which they are compared."""
     if trend.along == "wind":
         return "with the wind on than with the wind off"
-    if trend.along == "groups":
-        return f"in {listed(list(trend.runs))} than in the other runs"
-    return f"at the greatest {_ALONG[trend.along]} than at the least"
+    if not trend.runs:
+        return f"at the greatest {_ALONG[trend.along]} than at the least"
+    parted = f"in {listed(list(trend.runs))} than in the other runs"
+    if trend.of_condition:
+        return f"{parted}, which have another {_ALONG[trend.along]}"
+    return f"{parted} (another logger, day or clamping?)"
 
 
 def _ratio(interval: Sequence[float]) -> float:

@@ -6,7 +6,6 @@ A difference that follows a pattern has a cause, so it is not scatter
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -18,6 +17,7 @@ from diagnosis.likelihood.scatter_widths import Between, width_prior
 from diagnosis.search.scatter import shown_by
 from identification.campaign.random_effects import marginal
 from tunnel_sim.vocabulary.quantities import PerRun
+from tunnel_sim.vocabulary.record import Array
 
 IN_ORDER: Final = 5
 """Minimum number of runs that show a drift in their order. Judgement."""
@@ -40,13 +40,17 @@ class Pattern:
         along: as in `Trend`.
         values: of every run, from -1/2 to 1/2; 0 where the quantity does not act; shape (runs,), dimensionless.
         tried: number of patterns from which this one is chosen, at least 1.
-        runs: ids of the runs of the named group; empty for other patterns.
+        runs: ids of the runs of the named group; empty for a line along a condition or the order.
     """
 
     along: str
     values: PerRun
     tried: float = 1.0
     runs: tuple[str, ...] = ()
+
+    def is_like(self, other: Pattern) -> bool:
+        """Whether another pattern has the same values, or their negative."""
+        return any(np.allclose(self.values, sign * other.values) for sign in (1.0, -1.0))
 
 
 @dataclass(frozen=True)
@@ -63,7 +67,7 @@ class Trend:
         only: whether the runs show no scatter of the quantity beside the trend.
         along: ``order``, ``spring_stiffness``, ``wind_speed``, ``air_density``, ``amplitude``, ``wind`` (on
             against off) or ``groups``.
-        runs: ids of the runs of the named group; empty for other patterns.
+        runs: ids of the runs of the named group; empty for a line along a condition or the order.
     """
 
     effect: str
@@ -91,7 +95,7 @@ def trends(fitted: Fit) -> tuple[Trend, ...]:
     for place, one in enumerate(fitted.problem.scatter):
         if one.name not in shown:
             continue
-        compared = list(_patterns(fitted, place))
+        compared = _patterns(fitted, place)
         tried = [_trend(fitted, place, pattern, len(shown) * len(compared)) for pattern in compared]
         known = [trend for trend in tried if trend is not None]
         clearest += [min(known, key=lambda trend: trend.p_value)] if known else []
@@ -126,52 +130,64 @@ def _order(count: int) -> PerRun:
     return np.linspace(-0.5, 0.5, count)
 
 
-def _patterns(fitted: Fit, place: int) -> Iterator[Pattern]:
-    """The patterns that the deviations of one quantity may follow."""
+def _patterns(fitted: Fit, place: int) -> list[Pattern]:
+    """The patterns that the deviations of one quantity may follow, each once."""
     data = fitted.problem.data
     runs, acts = data.runs, data.acts(fitted.problem.scatter[place].kind)
+    springs, speeds = (
+        np.array([run.spring_stiffness or 0.0 for run in runs]),
+        [run.wind_speed for run in runs],
+    )
     conditions = {
-        "spring_stiffness": [run.spring_stiffness or 0.0 for run in runs],
-        "wind_speed": [run.wind_speed for run in runs],
-        "air_density": [run.air_density for run in runs],
-        "amplitude": [0.5 * float(np.ptp(run.reading)) for run in runs],
-        "wind": [float(run.wind_on) for run in runs],
+        "spring_stiffness": springs,
+        "wind_speed": np.array(speeds),
+        "air_density": np.array([run.air_density for run in runs]),
+        "amplitude": np.array([0.5 * float(np.ptp(run.reading)) for run in runs]),
+        "wind": np.array([float(run.wind_on) for run in runs]),
     }
-    yield Pattern(_ORDER, _order(len(runs)))
-    known: list[PerRun] = []
+    found = [Pattern(_ORDER, _order(len(runs)))]
     for along, given in conditions.items():
-        values = np.array(given)
         # without wind no air density is stated
-        has = acts & (values > 0.0) if along == "air_density" else acts
-        low, high = float(values[has].min(initial=np.inf)), float(values[has].max(initial=0.0))
+        has = acts & (given > 0.0) if along == "air_density" else acts
+        low, high = float(given[has].min(initial=np.inf)), float(given[has].max(initial=0.0))
         if high - low > CONDITION_RANGE * high:
-            scaled = np.where(has, (values - low) / (high - low) - 0.5, 0.0)
-            if not any(np.array_equal(scaled, other) for other in known):
-                yield Pattern(along, scaled)
-            known.append(scaled)
-    groups = _two_groups(fitted, place, acts)
-    if groups is not None and not any(np.array_equal(np.abs(groups.values), np.abs(one)) for one in known):
-        yield groups
+            found.append(Pattern(along, np.where(has, (given - low) / (high - low) - 0.5, 0.0)))
+    found += _two_groups(fitted, place, "spring_stiffness", springs)
+    found += _two_groups(fitted, place, "wind_speed", np.array(speeds))
+    found += _two_groups(fitted, place, _GROUPS, np.arange(len(runs)))
+    return [one for index, one in enumerate(found) if not any(map(one.is_like, found[:index]))]
 
 
-def _two_groups(fitted: Fit, place: int, acts: np.ndarray) -> Pattern | None:
-    """The runs parted in two groups by the largest step of their deviations; None for too few runs.
+def _two_groups(fitted: Fit, place: int, along: str, labels: Array) -> list[Pattern]:
+    """The runs parted in the two groups whose mean deviations differ most; empty for too few runs or labels.
 
     A single run that stands apart is an outlier and no group. Every partition counts as a pattern tried.
+
+    Args:
+        labels: of every run; runs of one label are in one group; shape (runs,).
     """
-    where = np.flatnonzero(acts)
-    if where.size < OF_GROUPS:
-        return None
-    own = marginal(fitted.columns.products, width_prior(fitted.problem).most).deviations[where, place]
-    ranked = where[np.argsort(own)]
-    steps = np.diff(np.sort(own))[1:-1]  # at least two runs in a group
-    lower = ranked[: int(np.argmax(steps)) + 2]
-    upper = ranked[lower.size :]
-    named, others = (lower, upper) if lower.size < upper.size else (upper, lower)
-    values = np.zeros(acts.size)
-    values[named], values[others] = 0.5, -0.5
-    ids = tuple(fitted.problem.data.runs[index].id for index in sorted(named.tolist()))
-    return Pattern(_GROUPS, values, 2.0 ** (where.size - 1) - 1.0, ids)
+    where = np.flatnonzero(fitted.problem.data.acts(fitted.problem.scatter[place].kind))
+    _, label = np.unique(labels[where], return_inverse=True)
+    count = np.bincount(label)
+    if where.size < OF_GROUPS or count.size < 2:
+        return []
+    prior = width_prior(fitted.problem)
+    # free in one quantity only: the runs divide a difference poorly between the wind speed and the spring
+    widths = np.where(np.arange(prior.most.size) == place, prior.most, prior.least)
+    own = marginal(fitted.columns.products, widths).deviations[where, place]
+    sums = np.bincount(label, own)
+    ranked = np.argsort(sums / count)
+    lower, below = np.cumsum(count[ranked])[:-1], np.cumsum(sums[ranked])[:-1]
+    upper, above = where.size - lower, own.sum() - below
+    apart = np.where(np.minimum(lower, upper) > 1, (above / upper - below / lower) ** 2 * lower * upper, 0.0)
+    if not apart.any():
+        return []
+    in_lower = np.isin(label, ranked[: int(np.argmax(apart)) + 1])
+    named = in_lower if in_lower.sum() < (~in_lower).sum() else ~in_lower
+    values = np.zeros(labels.size)
+    values[where] = np.where(named, 0.5, -0.5)
+    ids = tuple(fitted.problem.data.runs[index].id for index in where[named].tolist())
+    return [Pattern(along, values, 2.0 ** (count.size - 1) - 1.0, ids)]
 
 
 def _trend(fitted: Fit, place: int, pattern: Pattern, tried: int) -> Trend | None:

@@ -33,6 +33,10 @@ def test_the_credible_set_is_the_smallest_with_nine_tenths():
             Predictions(held_out=0.98, part=20.8),
             "explains the gap by cancelling: with a part of the causes the misfit is 21 times",
         ),
+        (
+            Predictions(held_out=0.98, pattern=0.0032),
+            "leaves a difference of 0.32 % between the runs that follows a condition of the plan",
+        ),
         (Predictions(held_out=0.2, ahead=0.2, patched=0.2, left=0.09, part=1.0), ""),
         (Predictions(), ""),
     ],

@@ -10,7 +10,7 @@ import pytest
 from diagnosis.answer.run_deviations import ScatterLimits, Spread
 from diagnosis.findings.cautions import CAUTIONS, sentence_of
 from diagnosis.findings.judgements import zeros_apart
-from diagnosis.findings.repeatability import RunRepeatability
+from diagnosis.findings.repeatability import RunRepeatability, trend_words
 from diagnosis.findings.units import own_repeatability
 from diagnosis.likelihood.least_squares import fit_at
 from diagnosis.model.parameters import Point
@@ -99,6 +99,52 @@ def test_scatter_that_follows_a_pattern_is_not_answered_with_the_remedy_of_chanc
     assert "from the first run to the last" in by_order.words
     for others in ((), (replace(trend, left=0.008),), (replace(trend, effect="stiffness_scatter"),)):
         assert RunRepeatability((spread,), trends=others).pattern_step(SPEED) is None
+
+
+@pytest.mark.parametrize(
+    ("along", "only", "said", "sought"),
+    [
+        (
+            "order",
+            True,
+            "The runs drift but do not scatter: the spring falls by 0.300(10) % from the first to the last run",
+            "from the first run to the last",
+        ),
+        (
+            "wind",
+            True,
+            "The runs differ but do not scatter: the spring is 0.300(10) % lower with the wind on than with the",
+            "with the wind on",
+        ),
+        (
+            "groups",
+            True,
+            "the spring is 0.300(10) % lower in r2 and r5 than in the other runs (another logger, day or clamp",
+            "in r2 and r5",
+        ),
+        (
+            "spring_stiffness",
+            True,
+            "lower in r2 and r5 than in the other runs, which have another stiffness of the spring",
+            "with the stiffness of the spring",
+        ),
+        (
+            "amplitude",
+            False,
+            "Part of this is not by chance: the spring is 0.300(10) % lower at the greatest amplitude than at the "
+            "least. The remaining scatter is 0.010 %",
+            "with the amplitude",
+        ),
+    ],
+)
+def test_a_pattern_is_said_and_its_cause_is_sought(along: str, only: bool, said: str, sought: str) -> None:
+    named = ("r2", "r5") if along in ("groups", "spring_stiffness") else ()
+    trend = Trend("stiffness_scatter", -3e-3, 1e-4, 1e-6, 1e-4, only, along, named)
+    assert said in trend_words(trend).replace(" ± 0.010", "(10)")
+    (step,) = RunRepeatability((), trends=(trend,)).pattern_steps
+    assert step.words.startswith(f"Look for what makes the spring differ {sought}")
+    by_chance = replace(trend, along="order", only=False)
+    assert RunRepeatability((), trends=(by_chance,)).pattern_steps == []
 
 
 def test_a_wind_that_differs_by_chance_does_not_drift(

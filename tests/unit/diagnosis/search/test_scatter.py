@@ -57,6 +57,7 @@ def campaign(
     *,
     scatter: float = 1.0,
     drift: float = 0.0,
+    by_spring: float = 0.0,
     cubic: float = 0.0,
     repeatability: Repeatability | None = None,
     duration: float = 5.0,
@@ -66,6 +67,7 @@ def campaign(
     Args:
         scatter: factor on the standard deviations.
         drift: relative change of the damping from the first to the last run.
+        by_spring: relative change of the damping from the softer half of the springs to the stiffer.
         cubic: κ of a hardening spring, 1/rad².
         duration: of a run, s.
     """
@@ -76,6 +78,7 @@ def campaign(
     for number, (stiffness, (of_spring, of_damper)) in enumerate(zip(SPRINGS, differences, strict=True)):
         spring = stiffness * (1.0 + scatter * SPRING * of_spring)
         damper = DAMPING * (1.0 + scatter * DAMPER * of_damper + drift * order[number])
+        damper *= 1.0 + by_spring * (stiffness > 20.0)
 
         def rates(_: float, y: np.ndarray, k: float = spring, c: float = damper) -> list[float]:
             return [y[1], -(k * (y[0] + cubic * y[0] ** 3) + c * y[1]) / INERTIA]
@@ -232,6 +235,17 @@ def test_what_follows_the_order_of_the_runs_is_no_scatter() -> None:
         "Look for what makes the mechanical damping differ from the first run to the last: the runs differ by"
     )
     assert next_steps(found)[0].startswith(first)
+
+
+def test_a_difference_with_a_condition_beside_a_cause_leaves_the_answer_undecided() -> None:
+    found = diagnose(campaign(scatter=0.0, cubic=0.1, by_spring=0.2), kinds=FEW)
+    assert found.causes == ("cubic_stiffness", DAMPED)
+    assert not found.decided
+    assert [doubt.kind for doubt in found.decision.doubts] == ["pattern"]
+    assert "The runs differ but do not scatter: the mechanical damping is" in found.verdict
+    assert next_steps(found)[0].startswith(
+        "Look for what makes the mechanical damping differ with the stiffness"
+    )
 
 
 @pytest.mark.parametrize(("scatter", "only"), [(0.0, True), (1.0, False)])
