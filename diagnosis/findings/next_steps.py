@@ -54,7 +54,8 @@ def steps(answer: Findings) -> list[NextStep]:
     if not decided:
         return [*_deciding(answer), *runs, *model_steps(answer.model, answer), _NO_REPAIR]
     if causes == UNKNOWN:
-        first = [*answer.repeated.pattern_steps, _look(answer)]
+        outside = list(_from_outside(answer))
+        first = [*(outside or answer.repeated.pattern_steps), _look(answer)]
         return [*first, *runs, *model_steps(answer.model, answer), *_narrowing(answer)]
     meanwhile = NextStep("Until then use the coefficients with the causes, not those without")
     last = [NextStep("Do not trust the coefficients beyond their intervals", "the residual gap changes them")]
@@ -257,6 +258,13 @@ def _deciding(answer: Findings) -> Iterator[NextStep]:
     kinds = ["springs"] * springs + ["wind speeds"] * answer.windy
     kinds += ["inputs" if answer.found.driven else "release angles"]
     yield NextStep(f"Add runs with other {plain(*kinds)}", "these runs leave the answer undecided")
+
+
+def _from_outside(answer: Findings) -> Iterator[NextStep]:
+    """What to do about causes from outside the vocabulary that would explain the gap."""
+    for rival in answer.found.rivals:
+        if remedy := rival.figures.get("remedy"):
+            yield NextStep(str(remedy), "a cause that is not in the vocabulary would explain the gap")
 
 
 def _look(answer: Findings) -> NextStep:

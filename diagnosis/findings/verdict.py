@@ -107,7 +107,9 @@ def _answer(answer: Findings, rest: str) -> str:
         likely = answer.decision.words(runs_of_the_gap(answer.where, facts.place))
         return " ".join(filter(None, (sentence, likely, repeats, by_first)))
     if causes == UNKNOWN:
-        nearly = "" if facts.nearly is None else facts.nearly.words
+        nearly = "" if facts.nearly is None or facts.rivals else facts.nearly.words
+        # a cause from outside the vocabulary explains the differences between the runs as well
+        repeats = "" if facts.rivals else repeats
         sure = answer.surely_beside
         beside = (
             f"{_sentence(plain(*sure))} {'are' if len(sure) > 1 else 'is'} a part of it. " if sure else ""

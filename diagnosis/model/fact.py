@@ -33,13 +33,15 @@ class Fact:
         return {"kind": data["kind"], "figures": {name: data[name] for name in data if name != "kind"}}
 
 
-def as_stated(words: str, kind: str = "stated", figures: Mapping[str, Any] = {}) -> Fact:
+def as_stated(words: str, kind: str = "stated", figures: Mapping[str, Any] = {}, *, remedy: str = "") -> Fact:
     """A sentence from a nominal model or a rival, as a fact.
 
     Args:
         figures: the quantities in the sentence, as in `Fact`.
+        remedy: what to do about it, a sentence without its full stop, which is added to the words; empty: nothing.
     """
-    return Fact(kind, {**figures, "words": words})
+    said = f"{words} {remedy}." if remedy else words
+    return Fact(kind, {**figures, "words": said, "remedy": remedy})
 
 
 @dataclass(frozen=True)

@@ -193,7 +193,13 @@ class FrictionByDirection(Rival):
         shown = [name for name in _OF_MEAN.values() if _shown(fit, name)]
         beside = [name for name in best.names if name not in (DirectedFriction.name, rubbing.name)]
         figures |= {"differs": shown, "back_driven": _back_driven(fit), "beside": beside}
-        return as_stated(_words(figures), "friction by direction", figures)
+        return as_stated(_words(figures), "friction by direction", figures, remedy=_REMEDY)
+
+
+_REMEDY = (
+    "Raise and lower a known weight slowly: the motor's moment is greater than the weight's by the friction in "
+    "drive, and smaller by the friction in back-drive"
+)
 
 
 def _words(found: Mapping[str, Any]) -> str:
@@ -204,9 +210,7 @@ def _words(found: Mapping[str, Any]) -> str:
     return (
         "Friction that differs between drive (the motor drives the load) and back-drive (the load drives the "
         f"motor) would explain the gap{beside}; it is not in the vocabulary. It is {drive} in drive, and {back} in "
-        f"back-drive, which is {percent(found['back_driven'])} of the travel.{alike} Raise and lower a known "
-        "weight slowly: the motor's moment is greater than the weight's by the friction in drive, and smaller by "
-        "the friction in back-drive."
+        f"back-drive, which is {percent(found['back_driven'])} of the travel.{alike}"
     )
 
 

@@ -116,7 +116,10 @@ class InertiaBySpring(Rival):
         ]
         beside = [name for name in best.names if name not in own]
         figures = {"springs": [asdict(one) for one in each], "beside": beside}
-        return as_stated(_words(figures), "inertia by spring", figures)
+        return as_stated(_words(figures), "inertia by spring", figures, remedy=_REMEDY)
+
+
+_REMEDY = "Weigh the adapters and clamps of the springs"
 
 
 def _words(found: Mapping[str, Any]) -> str:
@@ -128,7 +131,7 @@ def _words(found: Mapping[str, Any]) -> str:
     ]
     return (
         f"An inertia that differs from spring to spring would explain the gap{beside}: {listed(each)}, against the "
-        "softest spring. Weigh the adapters and clamps of the springs."
+        "softest spring."
     )
 
 

@@ -184,7 +184,12 @@ class TwoInertias(Rival):
             below = 1.0 / sqrt(1.0 + ratio)
             slope = np.array([below, 0.0, -0.5 * omega * below**3])
             figures |= {"antiresonance": hertz(omega * below, slope), "ratio": {"value": ratio, "std": std}}
-        return as_stated(_words(figures), "second inertia", figures)
+        remedy = (
+            "Lock the link, or measure its angle, too"
+            if kind.at_motor
+            else "Measure the angle at the motor, too"
+        )
+        return as_stated(_words(figures), "second inertia", figures, remedy=remedy)
 
 
 def _words(found: Mapping[str, Any]) -> str:
@@ -198,12 +203,12 @@ def _words(found: Mapping[str, Any]) -> str:
     if "ratio" not in found:
         return (
             f"{first}{resonance} without an antiresonance: the angle is measured at the link. A resonance of the "
-            "actuator or the sensor would look alike. Measure the angle at the motor, too."
+            "actuator or the sensor would look alike."
         )
     ratio = for_people(found["ratio"]["value"], found["ratio"]["std"], "1")
     return (
         f"{first}an antiresonance at {_hertz(found['antiresonance'])} and {resonance}: the angle is measured at "
-        f"the motor, and the link's inertia is {ratio} times the motor's. Lock the link, or measure its angle, too."
+        f"the motor, and the link's inertia is {ratio} times the motor's."
     )
 
 

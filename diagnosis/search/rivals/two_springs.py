@@ -100,7 +100,10 @@ class TwoSprings(Rival):
         springs = [asdict(spring_error(best.fit, name, similarity)) for name in both]
         beside = [name for name in best.names if name not in both]
         figures = {"springs": springs, "beside": beside}
-        return as_stated(_words(figures), "two springs off", figures)
+        return as_stated(_words(figures), "two springs off", figures, remedy=_REMEDY)
+
+
+_REMEDY = "Measure the stiffness of the springs again"
 
 
 def _words(found: Mapping[str, Any]) -> str:
@@ -108,8 +111,7 @@ def _words(found: Mapping[str, Any]) -> str:
     beside = f" beside {plain(*found['beside'])}" if found["beside"] else ""
     springs = " and ".join(SpringError(**one).words for one in found["springs"])
     return (
-        f"Two springs that are not as stiff as stated would explain the gap{beside}: for example, "
-        f"{springs}. Measure their stiffness again."
+        f"Two springs that are not as stiff as stated would explain the gap{beside}: for example, {springs}."
     )
 
 

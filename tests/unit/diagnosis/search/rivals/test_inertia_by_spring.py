@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from diagnosis import diagnose
+from diagnosis.findings.next_steps import next_steps
 from diagnosis.search.answer import UNKNOWN
 from diagnosis.search.rivals.inertia_by_spring import InertiaBySpring
 from tests.support.gap_campaigns import CN_BETA, CN_R, DAMPING, INERTIA, NOISE, nominal
@@ -49,6 +50,10 @@ def test_an_inertia_that_differs_by_spring_is_unknown_and_said_with_its_size() -
     assert tuple(found.causes) == UNKNOWN
     assert "An inertia that differs from spring to spring would explain the gap: −0.33" in found.verdict
     assert "Two springs" not in found.verdict  # these leave much more
+    assert "the runs differ" not in found.verdict  # the inertia explains their differences
+    assert next_steps(found)[0].startswith(
+        "Weigh the adapters and clamps of the springs: a cause that is not in"
+    )
 
 
 @pytest.mark.slow
