@@ -12,6 +12,7 @@ import numpy as np
 
 from diagnosis.answer.held_out import Waterfall, excess_base
 from diagnosis.answer.linear_theory import coefficient_move, coefficients_of
+from diagnosis.answer.own_motion import with_own_motions
 from diagnosis.diagnosable import Chosen, gain_words
 from diagnosis.findings.averaged_coefficients import (
     Answers,
@@ -201,7 +202,7 @@ def composed(
             "settings": study.settings.differences(),
             "left_out": list(asked.left_out),
         },
-        disturbed=study.disturbed,
+        disturbed=with_own_motions(study, chosen.campaign),
         remarks=remarks,
         inclusion={}
         if cycling

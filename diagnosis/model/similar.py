@@ -9,7 +9,7 @@ import numpy as np
 from diagnosis.model.choose import nominal_model
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.similarity import REFERENCE_FREQUENCY, Similarity, free_frequency, reach
-from tunnel_sim.vocabulary.campaign import Campaign, RigProperties
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run
 from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.record import Record
 
@@ -53,15 +53,17 @@ def similar_campaign(campaign: Campaign, model: NominalModel | None = None) -> t
         resolution=known(sensor.resolution, unit),
         noise_std=known(sensor.noise_std, unit),
     )
-    runs = []
-    for run in campaign.runs:
-        readings = (run.record.yaw_rad - change.rest) * change.similar(1.0, change.reading)
-        record, spring = Record(run.record.time_s * change.time, readings), run.spring_stiffness
-        drive = None if run.drive is None else _drive(run.drive, change)
-        spring = None if spring is None else spring * change.moment
-        runs.append(dataclasses.replace(run, record=record, spring_stiffness=spring, drive=drive))
-    similar = dataclasses.replace(campaign, rig=similar_rig, sensor=similar_sensor, runs=tuple(runs))
-    return similar, change
+    runs = tuple(similar_run(run, change) for run in campaign.runs)
+    return dataclasses.replace(campaign, rig=similar_rig, sensor=similar_sensor, runs=runs), change
+
+
+def similar_run(run: Run, change: Similarity) -> Run:
+    """A run of the similar rig."""
+    readings = (run.record.yaw_rad - change.rest) * change.similar(1.0, change.reading)
+    record, spring = Record(run.record.time_s * change.time, readings), run.spring_stiffness
+    drive = None if run.drive is None else _drive(run.drive, change)
+    spring = None if spring is None else spring * change.moment
+    return dataclasses.replace(run, record=record, spring_stiffness=spring, drive=drive)
 
 
 def _drive(drive: Input, change: Similarity) -> Input:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from identification.show.quantity import Quantity
+
 
 @dataclass(frozen=True)
 class Disturbance:
@@ -18,6 +20,10 @@ class Disturbance:
             model of the other runs, by chance and by causes that act in all runs, a fraction.
         used: whether the run is used as a whole, because the other runs do not determine the model.
         kept_from_s: start of the used part, by the same clock, s; None: the start of the run.
+        frequency: frequency of a run that differs as a whole over the prediction by the model of the other runs,
+            minus one, dimensionless; None: not known.
+        damping: the same for the damping ratio.
+        as_they: whether the run moves as the others do but for these two numbers.
     """
 
     run: str
@@ -26,6 +32,14 @@ class Disturbance:
     p_value: float
     used: bool = False
     kept_from_s: float | None = None
+    frequency: Quantity | None = None
+    damping: Quantity | None = None
+    as_they: bool = False
+
+    @property
+    def as_a_whole(self) -> bool:
+        """Whether the run differs as a whole."""
+        return self.at_s is None and self.kept_from_s is None
 
     @property
     def left_out(self) -> bool:

@@ -13,7 +13,7 @@ import pytest
 from scipy.signal import butter, lfilter, lfilter_zi
 
 from diagnosis import diagnose
-from diagnosis.findings.disturbed_runs import disturbed_words, odd_runs
+from diagnosis.findings.disturbed_runs import disturbed_step, disturbed_words, odd_runs
 from diagnosis.findings.next_steps import next_steps
 from diagnosis.findings.verdict import headline
 from diagnosis.result import Diagnosis
@@ -21,6 +21,7 @@ from diagnosis.search.disturbance import Disturbance
 from diagnosis.search.disturbed import disturbances, undisturbed
 from diagnosis.search.investigate import investigate, nominal_study
 from diagnosis.search.odd_run import replaceable
+from identification.show.quantity import Quantity
 from tests.marks import slow
 from tests.support.diagnosis_document import findings_of
 from tests.support.gap_campaigns import INTERVAL, NOISE, campaign, nominal
@@ -111,6 +112,23 @@ def test_a_start_that_is_used_nevertheless_is_not_said_to_be_left_out() -> None:
     )
 
 
+def test_a_run_that_differs_is_said_with_its_own_frequency_and_damping() -> None:
+    odd = Disturbance(
+        "r2", None, None, 1e-5, frequency=Quantity(-0.0025, 0.0001, "1"), damping=Quantity(0.01, 0.01, "1")
+    )
+    linear, other = (
+        replace(odd, as_they=True),
+        "Run r2 differs from the others, and not in frequency and damping alone.",
+    )
+    assert disturbed_words(linear, no_gap=False) == (
+        "Run r2 differs from the others: its frequency is 0.250 ± 0.010 % lower than the model of the others "
+        "predicts. It is not used."
+    )
+    assert disturbed_words(odd, no_gap=False).startswith(other)
+    assert "its spring, its clock" in disturbed_step(linear).what
+    assert "its release, its unit" in disturbed_step(odd).what
+
+
 def test_a_run_alone_at_its_spring_or_without_wind_is_not_odd(plain: Campaign) -> None:
     kept = replace(plain, runs=(*plain.runs[:3], plain.runs[4]))
     assert replaceable(nominal(kept).problem.data) == [1, 2]
@@ -154,7 +172,7 @@ def test_the_words_name_the_odd_run(answer: Diagnosis) -> None:
     document = answer.to_json_dict()
     assert headline(answer) == ("No gap; run r5 differs from the others", "none")
     assert answer.verdict.startswith(
-        "Run r5 differs from the others. Without it there is no gap, so it is not used."
+        "Run r5 differs from the others, and not in frequency and damping alone. Without it there is no gap"
     )
     assert next_steps(answer)[0].startswith("Repeat run r5, which differs from the others")
     assert document["disturbed"][0]["at_s"] is None

@@ -301,5 +301,17 @@ def test_scatter_that_one_run_shows_is_an_odd_run() -> None:
     changed = tuple(faulty if run.id == faulty.id else run for run in runs.runs)
     found = diagnose(replace(runs, runs=changed), kinds=FEW)
     assert found.causes == ("cubic_stiffness",)
-    assert [one.run for one in found.disturbed] == [faulty.id]
-    assert f"Run {faulty.id} differs from the others. It is not used." in found.verdict
+    (odd,) = found.disturbed
+    assert odd.run == faulty.id
+    of_spring, of_damper = 15.0 * np.random.default_rng(56).standard_normal((len(SPRINGS), 2))[4]
+    frequency = np.sqrt(1.0 + SPRING * of_spring)
+    for own, true in (
+        (odd.frequency, frequency - 1.0),
+        (odd.damping, (1.0 + DAMPER * of_damper) / frequency - 1.0),
+    ):
+        assert own is not None
+        assert own.value == pytest.approx(true, abs=4.0 * own.std)
+        assert own.std < 0.1 * abs(true)
+    assert odd.as_they
+    assert f"Run {faulty.id} differs from the others: its frequency is " in found.verdict
+    assert any("its spring, its clock and what was mounted in it" in step for step in next_steps(found))
