@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,7 @@ import numpy as np
 from diagnosis.answer.held_out import Waterfall, excess_base
 from diagnosis.answer.linear_theory import coefficient_move, coefficients_of
 from diagnosis.answer.own_motion import with_own_motions
+from diagnosis.answer.sizes_by_run import SizeByRun, study_sizes
 from diagnosis.diagnosable import Chosen, gain_words
 from diagnosis.findings.averaged_coefficients import (
     Answers,
@@ -112,6 +114,11 @@ class Confirmed:
     study: Study
     closes: Closing
     repeats: RunRepeatability | None
+
+    @cached_property
+    def sizes(self) -> tuple[SizeByRun, ...]:
+        """Sizes of the fitted causes in every run, in the units of the similar campaign."""
+        return study_sizes(self.study)
 
     @classmethod
     def of(cls, study: Study) -> Confirmed:
@@ -220,7 +227,13 @@ def composed(
         motion=chosen.examined.sensor.freedom.motion,
         motion_scale=similarity.angle,
         **findings_of(
-            Answered(chosen.examined, study, named.coefficients.before, named.coefficients.comparable)
+            Answered(
+                chosen.examined,
+                study,
+                named.coefficients.before,
+                named.coefficients.comparable,
+                answered.sizes,
+            )
         ),
     )
 
@@ -332,7 +345,7 @@ def _named(
     study, closes = answered.study, answered.closes
     similarity, rig, settings = study.similarity, study.campaign.rig, study.settings
     where, place = located
-    weighed = candidates(study, excess_base(study), parameter_errors(study, closes))
+    weighed = candidates(study, excess_base(study), parameter_errors(study, closes, answered.sizes))
     answers = possible_answers(study, chosen.kinds)
     after = within_bounds(coefficients(answers, study.campaign), study)
     identified = _identified(study, chosen)
@@ -396,6 +409,7 @@ def _predictions(
         under_load=None if patched is None else patched.under_load(chosen),
         left=gap.misfit.of_swing(gap.excess_after),
         part=closes.steps.of_a_part,
+        size=max((one.differs_by for one in answered.sizes), default=None),
         pattern=max((abs(one.change) for one in patterns if one.of_condition), default=None),
         elsewhere=isinstance(place, PlaceFound) and place.elsewhere,
     )

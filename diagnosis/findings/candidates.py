@@ -13,7 +13,7 @@ import numpy as np
 
 from diagnosis.answer.held_out import Base
 from diagnosis.answer.linear_theory import move_of_halves, parameter_shift
-from diagnosis.findings.by_run import in_its_noise, sizes
+from diagnosis.answer.sizes_by_run import SizeByRun
 from diagnosis.findings.closing import Closing
 from diagnosis.findings.finding import Judged, Picture
 from diagnosis.findings.repeatability import RunRepeatability
@@ -264,8 +264,11 @@ def _parameters(
     return {name.split(".")[1] if single else name: value for name, value in own.items()}
 
 
-def parameter_errors(study: Study, closes: Closing) -> dict[str, float]:
+def parameter_errors(study: Study, closes: Closing, sizes: Sequence[SizeByRun]) -> dict[str, float]:
     """Standard deviations of the answer's parameters by other sources than noise, by ``effect.parameter``.
+
+    Args:
+        sizes: sizes of the causes in every run (`study_sizes`).
 
     Returns:
         In the parameters' units of the similar campaign. One source is the change by MuJoCo's integrator, where
@@ -279,9 +282,7 @@ def parameter_errors(study: Study, closes: Closing) -> dict[str, float]:
     stepped = np.zeros(len(problem.names))
     if not closes.confirmation.agrees and not closes.confirmation.failure:
         stepped = parameter_shift(fit, [closes.shifts[run.id] for run in problem.data.runs])
-    noisy = in_its_noise(study)
-    own = () if noisy is None else sizes(noisy, study.prepared.kinds)
-    by_run = {f"{one.effect}.{one.parameter}": one.form_std for one in own}
+    by_run = {f"{one.effect}.{one.parameter}": one.form_std for one in sizes}
     found = {}
     for place, name in enumerate(problem.names):
         if name in problem.effect_names and fit.bound(name) is None:

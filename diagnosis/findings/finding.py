@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Protocol, Self
 
+from diagnosis.answer.sizes_by_run import SizeByRun
 from diagnosis.findings.misfit import Misfit
 from diagnosis.search.study import Study
 from diagnosis.settings import Settings
@@ -34,12 +35,14 @@ class Answered:
         before: coefficients of the nominal model, by name, in the units of the measured campaign.
         after: coefficients with the causes, by the same names; in phase with the motion, like those before, where
             a lag is named.
+        sizes: sizes of the fitted causes in every run, in the units of the similar campaign.
     """
 
     campaign: Campaign
     study: Study
     before: Mapping[str, Quantity]
     after: Mapping[str, Quantity]
+    sizes: Sequence[SizeByRun]
 
 
 @dataclass(frozen=True)

@@ -154,7 +154,7 @@ def _patterns(fitted: Fit, place: int) -> list[Pattern]:
             found.append(Pattern(along, np.where(has, (given - low) / (high - low) - 0.5, 0.0)))
     found += _two_groups(fitted, place, "spring_stiffness", springs)
     found += _two_groups(fitted, place, "wind_speed", np.array(speeds))
-    found += _two_groups(fitted, place, _GROUPS, np.arange(len(runs)))
+    found += _two_groups(fitted, place, _GROUPS, np.arange(float(len(runs))))
     return [one for index, one in enumerate(found) if not any(map(one.is_like, found[:index]))]
 
 

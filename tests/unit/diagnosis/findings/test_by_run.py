@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from diagnosis import diagnose, vocabulary
-from diagnosis.findings.by_run import AGREE_RATE, CausesByRun, sizes
+from diagnosis.answer.sizes_by_run import AGREE_RATE, sizes
+from diagnosis.findings.by_run import CausesByRun
 from diagnosis.findings.sections import sections
 from diagnosis.likelihood.least_squares import Fit, fit
 from diagnosis.model.parameters import Point

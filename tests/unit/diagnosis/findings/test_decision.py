@@ -8,6 +8,19 @@ from diagnosis.findings.decision import Predictions, decision
 from diagnosis.settings import Settings
 
 
+@pytest.mark.parametrize(
+    ("size", "unknown", "decided"), [(0.3, 0.2, False), (0.3, 0.03, True), (0.1, 0.2, True)]
+)
+def test_a_size_that_differs_between_the_runs_makes_an_unknown_cause_likelier(
+    size: float, unknown: float, decided: bool
+) -> None:
+    answers = [("free_play", 0.7), ("unknown", unknown), ("coulomb_friction", 0.3 - unknown)]
+    found = decision(answers, Settings().answer, Predictions(held_out=0.98, size=size))
+    assert found.decided == decided
+    said = "Free play fits best, but differs by 30 % in size between the runs, beyond its errors."
+    assert (said in found.words("the runs")) != decided
+
+
 def test_the_credible_set_is_the_smallest_with_nine_tenths():
     answers = (("free_play", 0.35), ("cubic_stiffness", 0.33), ("quadratic_damping", 0.25), ("unknown", 0.07))
     assert decision(answers, Settings().answer).credible == answers[:3]

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from diagnosis import Diagnosis, diagnose, vocabulary
 from diagnosis.answer.held_out import excess_base, one_more
 from diagnosis.answer.linear_theory import coefficient_move, move_of_halves, parameter_shift
-from diagnosis.findings.by_run import sizes
+from diagnosis.answer.sizes_by_run import sizes, study_sizes
 from diagnosis.findings.candidates import candidates, parameter_errors
 from diagnosis.findings.closing import closing
 from tests.support.gap_campaigns import answer, campaign, nominal, studied
@@ -146,7 +146,11 @@ def test_a_size_on_which_the_runs_differ_has_more_than_the_error_of_noise():
     study = replace(study, answers=(answer(("cubic_stiffness",), 0.0, 1.0, best),))
     name = "cubic_stiffness.coefficient"
     (own,) = sizes(best, study.prepared.kinds)
-    assert parameter_errors(study, closing(study))[name] >= own.form_std > 10.0 * best.std(name)
+    assert (
+        parameter_errors(study, closing(study), study_sizes(study))[name]
+        >= own.form_std
+        > 10.0 * best.std(name)
+    )
 
 
 def test_a_named_disagreement_of_the_integrators_is_part_of_the_deviation(data, base):
@@ -154,7 +158,7 @@ def test_a_named_disagreement_of_the_integrators_is_part_of_the_deviation(data, 
     study = studied(data, base, (CAUSE,), best)
     study = replace(study, answers=(answer((CAUSE,), 0.0, 1.0, best),))
     agrees, name = closing(study), f"{CAUSE}.coefficient"
-    place, plain = best.problem.names.index(name), parameter_errors(study, agrees)
+    place, plain = best.problem.names.index(name), parameter_errors(study, agrees, study_sizes(study))
     assert plain[name] == pytest.approx(0.0, abs=best.std(name))
     apart = replace(
         agrees,
@@ -164,7 +168,7 @@ def test_a_named_disagreement_of_the_integrators_is_part_of_the_deviation(data, 
             for run, (common, _) in zip(best.problem.data.runs, best.jacobian, strict=True)
         },
     )
-    found = parameter_errors(study, apart)
+    found = parameter_errors(study, apart, study_sizes(study))
     assert found[name] == pytest.approx(np.hypot(5.0 * best.std(name), plain[name]))
     stds = [
         candidates(study, excess_base(study), given)[0].parameters["coefficient"].std

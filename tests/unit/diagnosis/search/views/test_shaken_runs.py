@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import pytest
 
-from diagnosis.findings.by_run import in_its_noise, sizes
+from diagnosis.answer.sizes_by_run import in_its_noise, sizes
 from diagnosis.likelihood.starting_points import loses_phase
 from diagnosis.search.investigate import investigate
 from tests.marks import slow
