@@ -27,6 +27,9 @@ OF_GROUPS: Final = 6
 """Minimum number of runs that show two groups. Judgement. The partitions of fewer runs leave no small p-value."""
 CONDITION_RANGE: Final = 0.05
 """Minimum relative range of a condition for the runs to be compared along it. Convention."""
+ORDER_CLEARER: Final = 10.0
+"""Minimum ratio of the p-values of a condition and of the order of the runs for a difference to be a drift.
+Convention. Strong evidence. Springs are often changed in order, and a cause that follows them is then no drift."""
 
 _ORDER, _GROUPS = "order", "groups"
 _OF_LINE = 2  # number of parameters of a straight line
@@ -98,8 +101,13 @@ def trends(fitted: Fit) -> tuple[Trend, ...]:
         compared = _patterns(fitted, place)
         tried = [_trend(fitted, place, pattern, len(shown) * len(compared)) for pattern in compared]
         known = [trend for trend in tried if trend is not None]
-        clearest += [min(known, key=lambda trend: trend.p_value)] if known else []
+        clearest += [min(known, key=_unlikely)] if known else []
     return tuple(clearest)
+
+
+def _unlikely(trend: Trend) -> float:
+    """The p-value of a trend, larger for a drift, which must be clearer than a condition."""
+    return trend.p_value * (ORDER_CLEARER if trend.along == _ORDER else 1.0)
 
 
 def with_drifts(fitted: Fit) -> Between | None:

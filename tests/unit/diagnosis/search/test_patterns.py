@@ -23,16 +23,18 @@ RATE = 0.05
 
 
 @cache
-def base() -> Fit:
-    """Twelve runs that repeat, fitted with the spring and the damper of each run."""
-    fitted = nominal(campaign(conditions=CONDITIONS, duration=6.0))
+def base(conditions: tuple[tuple[float, float], ...] = CONDITIONS) -> Fit:
+    """Runs that repeat, fitted with the spring and the damper of each run."""
+    fitted = nominal(campaign(conditions=conditions, duration=6.0))
     kinds = [effect_class(name) for name in (SPRING, "damping_scatter")]
     return fit(*with_deviations(fitted.problem, fitted.point, tuple(usual(fitted, one) for one in kinds)))
 
 
-def with_springs(deviations: np.ndarray, rng: np.random.Generator, *, rate: float = 0.001) -> Fit:
+def with_springs(
+    deviations: np.ndarray, rng: np.random.Generator, *, rate: float = 0.001, fitted: Fit | None = None
+) -> Fit:
     """The runs by linear theory, with given relative deviations of their springs and noise of unit variance."""
-    fitted = base()
+    fitted = fitted or base()
     place = fitted.problem.parameters.places(fitted.problem.scatter)[0]
     residuals = [
         rng.standard_normal(old.size) + own[:, place] * deviation
@@ -76,6 +78,17 @@ def test_the_smaller_group_is_named_with_its_sign() -> None:
     trend = the_trend(values + np.random.default_rng(7).normal(0.0, 1e-5, RUNS))
     assert trend.runs == ("r3", "r8", "r10")
     assert trend.change == pytest.approx(-2e-3, abs=4.0 * trend.std)
+
+
+@pytest.mark.parametrize(("share", "along"), [(0.0, "spring_stiffness"), (1.0, "order")])
+def test_a_drift_is_named_only_where_no_condition_explains_it_as_well(share: float, along: str) -> None:
+    """Springs that are changed in order: the difference follows the spring, or the order within each spring too."""
+    springs = np.repeat((16.12, 30.0, 44.84), 3)
+    rng, order = np.random.default_rng(12), np.linspace(-0.5, 0.5, springs.size)
+    values = share * order + (1.0 - share) * (springs - springs.mean()) / np.ptp(springs)
+    fitted = base(tuple(zip(springs.tolist(), (0.0, 15.0, 25.0) * 3, strict=True)))
+    (trend,) = trends(with_springs(3e-3 * values + rng.normal(0.0, 2e-5, springs.size), rng, fitted=fitted))
+    assert trend.along == along
 
 
 def test_one_run_apart_is_no_group() -> None:
