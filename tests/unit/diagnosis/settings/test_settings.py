@@ -35,7 +35,6 @@ KNOWN_IN_SEVERAL = {
     "coefficient_interval": "an interval has one probability, within bounds or without",
     "leak": "wherever channels are compared",
     "own_number_gain": "wherever an instant or a phase counts",
-    "trend_rate": "one test, for the answer and for its sentence",
     "which_scatters_rate": "shown beside other numbers, or beside a drift",
     "form_price": "the forms of an answer are not compared with an odd run",
     "disturbed_rate": "one rate, of a jump and of a run that differs as a whole",
