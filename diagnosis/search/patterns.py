@@ -142,13 +142,11 @@ def _patterns(fitted: Fit, place: int) -> list[Pattern]:
     """The patterns that the deviations of one quantity may follow, each once."""
     data = fitted.problem.data
     runs, acts = data.runs, data.acts(fitted.problem.scatter[place].kind)
-    springs, speeds = (
-        np.array([run.spring_stiffness or 0.0 for run in runs]),
-        [run.wind_speed for run in runs],
-    )
-    conditions = {
-        "spring_stiffness": springs,
-        "wind_speed": np.array(speeds),
+    settings = {
+        "spring_stiffness": np.array([run.spring_stiffness or 0.0 for run in runs]),
+        "wind_speed": np.array([run.wind_speed for run in runs]),
+    }
+    conditions = settings | {
         "air_density": np.array([run.air_density for run in runs]),
         "amplitude": np.array([0.5 * float(np.ptp(run.reading)) for run in runs]),
         "wind": np.array([float(run.wind_on) for run in runs]),
@@ -160,9 +158,8 @@ def _patterns(fitted: Fit, place: int) -> list[Pattern]:
         low, high = float(given[has].min(initial=np.inf)), float(given[has].max(initial=0.0))
         if high - low > CONDITION_RANGE * high:
             found.append(Pattern(along, np.where(has, (given - low) / (high - low) - 0.5, 0.0)))
-    found += _two_groups(fitted, place, "spring_stiffness", springs)
-    found += _two_groups(fitted, place, "wind_speed", np.array(speeds))
-    found += _two_groups(fitted, place, _GROUPS, np.arange(float(len(runs))))
+    for along, labels in (settings | {_GROUPS: np.arange(float(len(runs)))}).items():
+        found += _two_groups(fitted, place, along, labels)
     return [one for index, one in enumerate(found) if not any(map(one.is_like, found[:index]))]
 
 

@@ -181,7 +181,7 @@ class ScatterSettings:
         why="The test whether the runs scatter at all has the rate above.",
     )
     outlier_rate: float = rate("the test for an outlying run")
-    trend_rate: float = rate("the test for a drift over the campaign")
+    trend_rate: float = rate("the test for a pattern of the differences between runs")
 
 
 @dataclass(frozen=True)
