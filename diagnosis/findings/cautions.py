@@ -135,8 +135,8 @@ CAUTIONS: Mapping[str, Sentence] = {
     "contradicted": _contradicted,
     "explains too much": _explains_too_much,
     "only one run": _only_one_run,
-    "rested": "The body is at rest at the end of {runs}. The fits omit that part: the angle at which friction "
-    "stops a body says little about its motion.",
+    "rested": "The body is at rest at the end of {runs}. The fits omit that part: it says little about the "
+    "motion.",
     "zeros apart": lambda given: (
         f'A separate zero for each run would explain {share(given["share"])} of the gap. State zero = "per_run" '
         "under [sensor], and diagnose again, if the sensor or its mount may have moved between the runs."

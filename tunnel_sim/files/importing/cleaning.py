@@ -218,7 +218,7 @@ def _spread(time: Times, rows: NDArray[np.intp]) -> Times:
 
 def clock_text(time: Seconds) -> str:
     """A time by the file's clock to a millisecond: ``34200``, or ``14.275``."""
-    return f"{time:.3f}".rstrip("0").rstrip(".")
+    return f"{round(time, 3) + 0.0:.3f}".rstrip("0").rstrip(".")  # never -0
 
 
 def from_zero(time: Times) -> Times:

@@ -13,7 +13,7 @@ import pytest
 
 from tests.support.import_files import RATE, decay, written
 from tunnel_sim.files.importing.choices import ImportChoices
-from tunnel_sim.files.importing.cleaning import cleaned, clipped, from_zero, resolution, restarts
+from tunnel_sim.files.importing.cleaning import cleaned, clipped, clock_text, from_zero, resolution, restarts
 from tunnel_sim.files.importing.column_numbers import guessed_angle_unit, without_codes, without_overflow
 from tunnel_sim.files.importing.records import read_records
 from tunnel_sim.files.importing.releases import RecordPiece, find_runs, find_runs_of_rate
@@ -404,3 +404,10 @@ def test_readings_that_all_have_the_same_stamp_are_refused(tmp_path: Path) -> No
     text = "time_s,yaw_rad\n" + "".join(f"1e+300,{value:.8f}\n" for value in yaw)
     with pytest.raises(TunnelError, match="'yaw' holds no number where the file states a time"):
         read_records([written(tmp_path, "stuck.csv", text)])
+
+
+@pytest.mark.parametrize(
+    ("time", "text"), [(-1e-9, "0"), (34200.0, "34200"), (14.275, "14.275"), (-2.5, "-2.5")]
+)
+def test_a_time_is_written_to_a_millisecond(time: float, text: str) -> None:
+    assert clock_text(time) == text
