@@ -14,6 +14,7 @@ import numpy as np
 from diagnosis.answer.held_out import Waterfall, excess_base
 from diagnosis.answer.linear_theory import coefficient_move, coefficients_of
 from diagnosis.answer.own_motion import with_own_motions
+from diagnosis.answer.runs_in_still_air import left_in_still_air
 from diagnosis.answer.sizes_by_run import SizeByRun, study_sizes
 from diagnosis.diagnosable import Chosen, gain_words
 from diagnosis.findings.averaged_coefficients import (
@@ -409,6 +410,7 @@ def _predictions(
         under_load=None if patched is None else patched.under_load(chosen),
         left=gap.misfit.of_swing(gap.excess_after),
         part=closes.steps.of_a_part,
+        still_air=left_in_still_air(answered.study),
         size=max((one.differs_by for one in answered.sizes), default=None),
         pattern=max((abs(one.change) for one in patterns if one.of_condition), default=None),
         elsewhere=isinstance(place, PlaceFound) and place.elsewhere,

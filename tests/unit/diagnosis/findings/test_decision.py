@@ -50,6 +50,10 @@ def test_the_credible_set_is_the_smallest_with_nine_tenths():
             Predictions(held_out=0.98, pattern=0.0032),
             "leaves a difference of 0.32 % between the runs that follows a condition of the plan",
         ),
+        (
+            Predictions(held_out=0.98, still_air=0.052),
+            "leaves 5.2 % of the gap in the runs in still air, fitted alone",
+        ),
         (Predictions(held_out=0.2, ahead=0.2, patched=0.2, left=0.09, part=1.0), ""),
         (Predictions(), ""),
     ],
