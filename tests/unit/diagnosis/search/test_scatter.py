@@ -74,21 +74,31 @@ def campaign(
     rng, time = np.random.default_rng(56), np.arange(0.0, duration, 1.0 / RATE)
     differences = rng.standard_normal((len(SPRINGS), 2))
     order = np.linspace(-0.5, 0.5, len(SPRINGS))
-    runs = []
-    for number, (stiffness, (of_spring, of_damper)) in enumerate(zip(SPRINGS, differences, strict=True)):
-        spring = stiffness * (1.0 + scatter * SPRING * of_spring)
-        damper = DAMPING * (1.0 + scatter * DAMPER * of_damper + drift * order[number])
-        damper *= 1.0 + by_spring * (stiffness > 20.0)
+    springs = np.array(SPRINGS) * (1.0 + scatter * SPRING * differences[:, 0])
+    dampers = DAMPING * (1.0 + scatter * DAMPER * differences[:, 1] + drift * order)
+    dampers = dampers * (1.0 + by_spring * (np.array(SPRINGS) > 20.0))
 
-        def rates(_: float, y: np.ndarray, k: float = spring, c: float = damper) -> list[float]:
-            return [y[1], -(k * (y[0] + cubic * y[0] ** 3) + c * y[1]) / INERTIA]
+    def rates(_: float, y: np.ndarray) -> np.ndarray:
+        angle, rate = y.reshape(2, len(SPRINGS))
+        return np.concatenate([rate, -(springs * (angle + cubic * angle**3) + dampers * rate) / INERTIA])
 
-        if cubic:
-            swing = solve_ivp(rates, (0.0, time[-1]), (0.3, 0.0), "DOP853", time, rtol=1e-10, atol=1e-12).y[0]
-        else:
-            swing = damped_cosine(time, damper / INERTIA, spring / INERTIA, 0.3, 0.0)
-        record = Record(time, swing + rng.normal(0.0, NOISE, time.size))
-        runs.append(Run(f"r{number}", record, 0.0, spring_stiffness=stiffness))
+    if cubic:
+        start = np.repeat([0.3, 0.0], len(SPRINGS))
+        swings = solve_ivp(rates, (0.0, time[-1]), start, "DOP853", time, rtol=1e-10, atol=1e-12).y
+    else:
+        swings = [
+            damped_cosine(time, damper / INERTIA, spring / INERTIA, 0.3, 0.0)
+            for spring, damper in zip(springs, dampers, strict=True)
+        ]
+    runs = [
+        Run(
+            f"r{number}",
+            Record(time, swing + rng.normal(0.0, NOISE, time.size)),
+            0.0,
+            spring_stiffness=stiffness,
+        )
+        for number, (stiffness, swing) in enumerate(zip(SPRINGS, swings[: len(SPRINGS)], strict=True))
+    ]
     return Campaign(
         "again", RigProperties(), SensorProperties(RATE), tuple(runs), repeatability=repeatability
     )

@@ -47,35 +47,37 @@ def blown(
         sensor_error: cubic error of the readings, 1/rad².
     """
     rng, time = np.random.default_rng(7), np.arange(0.0, 8.0, 1.0 / RATE)
-    runs = []
-    for number, (stated, spring) in enumerate(zip(SPEEDS, SPRINGS, strict=True)):
-        wind = (stated + offset) * (1.0 + SCATTER * rng.standard_normal()) if stated else 0.0
-        pressure = 0.5 * DENSITY * wind**2 * BODY.frontal_area * BODY.length
-        lever = BODY.length / wind if wind else 0.0
-        turn, phase = 2.0 * np.pi * STROUHAL * wind / BODY.width, rng.uniform(0.0, 2.0 * np.pi)
+    stated, count = np.array(SPEEDS), len(SPEEDS)
+    differences, phase, noise = np.zeros(count), np.zeros(count), np.zeros((count, time.size))
+    for number, speed in enumerate(SPEEDS):
+        differences[number] = rng.standard_normal() if speed else 0.0
+        phase[number] = rng.uniform(0.0, 2.0 * np.pi)
+        noise[number] = rng.normal(0.0, NOISE, time.size)
+    wind = np.where(stated > 0.0, (stated + offset) * (1.0 + SCATTER * differences), 0.0)
+    pressure = 0.5 * DENSITY * wind**2 * BODY.frontal_area * BODY.length
+    lever = np.where(wind > 0.0, BODY.length / np.maximum(wind, 1e-9), 0.0)
+    turn, constant = 2.0 * np.pi * STROUHAL * wind / BODY.width, lead * lever
+    stiffness, damping = np.array(SPRINGS) - pressure * CN_BETA, DAMPING - pressure * lever * CN_R
 
-        def rates(
-            t: float,
-            y: np.ndarray,
-            k: float = spring - pressure * CN_BETA,
-            c: float = DAMPING - pressure * lever * CN_R,
-            forcing: tuple[float, float, float] = (pressure * shedding, turn, phase),
-            ahead: tuple[float, float] = (pressure * CN_BETA, lead * lever),
-        ) -> list[float]:
-            size, rate, start = forcing
-            stiffness, constant = ahead
-            behind = (y[0] - y[2]) if constant else 0.0
-            moment = -k * y[0] - c * y[1] + size * np.sin(rate * t + start) + stiffness * behind
-            return [y[1], moment / INERTIA, behind / constant if constant else 0.0]
+    def rates(t: float, y: np.ndarray) -> np.ndarray:
+        angle, rate, late = y.reshape(3, count)
+        behind = np.where(constant > 0.0, angle - late, 0.0)
+        moment = -stiffness * angle - damping * rate + pressure * CN_BETA * behind
+        moment += pressure * shedding * np.sin(turn * t + phase)
+        return np.concatenate([rate, moment / INERTIA, behind / np.where(constant > 0.0, constant, 1.0)])
 
-        start = (0.3, 0.0, 0.3)
-        swing = solve_ivp(rates, (0.0, time[-1]), start, "DOP853", time, rtol=1e-10, atol=1e-12).y[0]
-        record = Record(time, swing + sensor_error * swing**3 + rng.normal(0.0, NOISE, time.size))
-        runs.append(
-            Run(
-                f"r{number}", record, stated, air_density=DENSITY if stated else None, spring_stiffness=spring
-            )
+    start = np.repeat([0.3, 0.0, 0.3], count)
+    solved = solve_ivp(rates, (0.0, time[-1]), start, "DOP853", time, rtol=1e-10, atol=1e-12).y
+    runs = [
+        Run(
+            f"r{number}",
+            Record(time, swing + sensor_error * swing**3 + noise[number]),
+            speed,
+            air_density=DENSITY if speed else None,
+            spring_stiffness=spring,
         )
+        for number, (speed, spring, swing) in enumerate(zip(SPEEDS, SPRINGS, solved[:count], strict=True))
+    ]
     rig = RigProperties(frontal_area=BODY.frontal_area, reference_length=BODY.length, width=BODY.width)
     return Campaign("blown", rig, SensorProperties(RATE), tuple(runs))
 
