@@ -106,6 +106,8 @@ def test_a_start_that_is_used_nevertheless_is_not_said_to_be_left_out() -> None:
     words = disturbed_words(Disturbance("r2", None, None, 1e-5, used=True, kept_from_s=0.8), no_gap=False)
     assert words.startswith("Run r2 does not move as the others do at its start. It is used nevertheless")
     assert "not used" not in words
+    whole = disturbed_words(Disturbance("r2", None, None, 1e-5), no_gap=False)
+    assert whole.startswith("Run r2 differs from the others. It is not used.")
     late = Disturbance("r3", None, None, 1e-5, kept_from_s=0.8)
     assert odd_runs([replace(late, run="r2", used=True), late]) == (
         "; the start of run r3 not used; run r2 differs from the others"

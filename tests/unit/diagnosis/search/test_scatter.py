@@ -46,6 +46,7 @@ FEW = vocabulary(
     ["cubic_stiffness", "coulomb_friction", "spring_miscalibration", "stiffness_scatter", "damping_scatter"]
 )
 """What could be taken for scatter, where the whole vocabulary adds nothing but time."""
+FEWER = vocabulary(["cubic_stiffness", "stiffness_scatter", "damping_scatter"])
 PATTERNS = vocabulary(["reynolds_dependence", "spring_miscalibration", *SCATTERED])
 """What could be taken for scatter with the speed and the spring."""
 SPRING, DAMPER = 5e-4, 1e-2  # one standard deviation between runs, relative
@@ -176,7 +177,9 @@ def test_two_patterns_in_one_number_are_not_chance() -> None:
         record = Record(time, swing + rng.normal(0.0, NOISE, time.size))
         runs.append(Run(f"s{spring:g}-v{speed:g}", record, speed, spring, 1.2))
     rig = RigProperties(INERTIA, 0.036, 0.625, 0.225)
-    found = diagnose(Campaign("patterns", rig, SensorProperties(RATE), tuple(runs)), kinds=PATTERNS)
+    found = diagnose(
+        Campaign("patterns", rig, SensorProperties(RATE), tuple(runs)), kinds=PATTERNS, rivals=()
+    )
     assert found.causes == ("reynolds_dependence", "spring_miscalibration")
     assert found.decision.decided
     assert (
@@ -233,7 +236,7 @@ def test_a_further_run_is_predicted_without_a_deviation() -> None:
 
 
 def test_what_follows_the_order_of_the_runs_is_no_scatter() -> None:
-    found = diagnose(campaign(scatter=0.0, drift=0.2), kinds=FEW)
+    found = diagnose(campaign(scatter=0.0, drift=0.2), kinds=FEW, rivals=())
     assert found.causes == ("unknown",)
     assert found.repeatability is not None
     (trend,) = found.repeatability.trends
@@ -295,7 +298,7 @@ def test_a_run_far_beyond_the_others_is_an_outlier() -> None:
     runs = campaign()
     faulty = campaign(scatter=25.0).runs[4]
     changed = tuple(faulty if run.id == faulty.id else run for run in runs.runs)
-    found = diagnose(replace(runs, runs=changed), kinds=FEW)
+    found = diagnose(replace(runs, runs=changed), kinds=FEWER, rivals=())
     assert found.repeatability is not None
     assert found.repeatability.outlier == faulty.id
     others = found.repeatability.without_outlier
@@ -309,10 +312,10 @@ def test_scatter_that_one_run_shows_is_an_odd_run() -> None:
     runs = campaign(scatter=0.0, cubic=0.1)
     faulty = campaign(scatter=15.0, cubic=0.1).runs[4]
     changed = tuple(faulty if run.id == faulty.id else run for run in runs.runs)
-    found = diagnose(replace(runs, runs=changed), kinds=FEW)
+    found = diagnose(replace(runs, runs=changed), kinds=FEWER, rivals=())
     assert found.causes == ("cubic_stiffness",)
     (odd,) = found.disturbed
-    assert odd.run == faulty.id
+    assert (odd.run, odd.left_out) == (faulty.id, True)
     of_spring, of_damper = 15.0 * np.random.default_rng(56).standard_normal((len(SPRINGS), 2))[4]
     frequency = np.sqrt(1.0 + SPRING * of_spring)
     for own, true in (
