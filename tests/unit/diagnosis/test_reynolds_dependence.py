@@ -17,7 +17,7 @@ from tunnel_sim.effects.parameters import Circumstances, WindOnRun
 from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings, simulate_campaign
 from tunnel_sim.vocabulary.plan import CampaignPlan, Condition, EffectSetting, SensorModel, Truth
 
-pytestmark = pytest.mark.usefixtures("unexamined")
+pytestmark = pytest.mark.usefixtures("unexamined", "causes_alone")
 KINDS = [
     effect_class(name)
     for name in ("reynolds_dependence", "wind_speed_offset", "wind_speed_drift", "gravity_stiffness")
@@ -35,7 +35,9 @@ def plan(speeds, name="reynolds_dependence", **values):
 
 
 def test_three_speeds_name_it_with_its_size_and_with_cn_beta_at_the_mean_speed():
-    found = diagnose(simulate_campaign(plan((0.0, 12.0, 18.0, 25.0), per_e_fold=0.05)), kinds=KINDS)
+    found = diagnose(
+        simulate_campaign(plan((0.0, 12.0, 18.0, 25.0), per_e_fold=0.05)), kinds=KINDS, rivals=()
+    )
     assert found.causes == ("reynolds_dependence",)
     size = found.candidates[0].parameters["per_e_fold"]
     assert abs(size.value - 0.05) < 4.0 * size.std
@@ -45,7 +47,7 @@ def test_three_speeds_name_it_with_its_size_and_with_cn_beta_at_the_mean_speed()
 
 def test_three_speeds_tell_it_from_an_offset_of_the_speed():
     data = simulate_campaign(plan((0.0, 12.0, 18.0, 25.0), "wind_speed_offset", offset=0.3))
-    assert investigate(data, KINDS).causes == ("wind_speed_offset",)
+    assert investigate(data, KINDS, rivals=()).causes == ("wind_speed_offset",)
 
 
 def test_two_speeds_are_said_to_tell_them_apart_by_the_damping_alone():

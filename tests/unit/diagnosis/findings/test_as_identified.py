@@ -8,13 +8,15 @@ from tests.support.gap_campaigns import campaign
 from tests.support.scattered_runs import SCATTERED, scattered
 from tunnel_sim.effects import effect_class
 
+pytestmark = pytest.mark.usefixtures("causes_alone")
+
 KINDS = [effect_class(name) for name in SCATTERED]
 
 
 @pytest.mark.parametrize("scatters", [False, True])
 def test_one_number_has_one_value(scatters):
     data = scattered() if scatters else campaign(duration=6.0)
-    found, estimate = diagnose(data, kinds=KINDS), identify(data)
+    found, estimate = diagnose(data, kinds=KINDS, rivals=()), identify(data)
     assert set(found.causes) <= set(SCATTERED)
     assert bool(found.causes) == scatters
     for name in ("cn_beta", "cn_r"):

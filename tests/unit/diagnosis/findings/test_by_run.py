@@ -22,6 +22,8 @@ from tests.support.gap_campaigns import campaign, nominal
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
 from tunnel_sim.vocabulary.campaign import Campaign
 
+pytestmark = pytest.mark.usefixtures("causes_alone")
+
 SIZE = 0.3
 FEW = vocabulary(["cubic_stiffness", "quadratic_damping", "coulomb_friction"])
 CUBIC, DOUBLE = (effect_from("cubic_stiffness", {"coefficient": factor * SIZE}) for factor in (1.0, 2.0))

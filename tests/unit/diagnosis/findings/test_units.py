@@ -22,6 +22,8 @@ from tunnel_sim.vocabulary.campaign import RigProperties
 from tunnel_sim.vocabulary.dimensions import dimension
 from tunnel_sim.vocabulary.freedom import DISPLACEMENT
 
+pytestmark = pytest.mark.usefixtures("causes_alone")
+
 SETTINGS = tuple(Setting(spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 12.0, 24.0))
 RIGS = {
     "both": (RigProperties(None, AREA, LENGTH), {"cn_beta": 1.0, "cn_r": 1.0}, ("1/rad", "1/rad")),

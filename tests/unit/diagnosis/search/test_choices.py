@@ -22,6 +22,8 @@ from tests.support.diagnosis_document import document, findings_of
 from tests.support.gap_campaigns import CN_BETA, campaign, precise
 from tunnel_sim.effects import effect_class, effect_from
 
+pytestmark = pytest.mark.usefixtures("causes_alone")
+
 NAME = "spring_miscalibration"
 KINDS = [effect_class(NAME), effect_class("coulomb_friction")]
 

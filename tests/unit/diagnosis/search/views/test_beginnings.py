@@ -14,13 +14,15 @@ from diagnosis.search.study import Study
 from diagnosis.search.views.beginnings import AfterBeginnings, Beginnings, beginnings, common_length
 from diagnosis.search.views.whole_runs import WholeRuns
 from tests.support.driven_runs import COUNT, Planted, driven
-from tests.support.gap_campaigns import campaign, nominal
+from tests.support.gap_campaigns import FOUR, campaign, nominal
 from tests.unit.diagnosis.test_driven_lost_samples import COUNT as COUNT_LOST
 from tests.unit.diagnosis.test_driven_lost_samples import LOST, SHARES
 from tests.unit.diagnosis.test_driven_lost_samples import campaign as with_lost_samples
 from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Record
+
+pytestmark = pytest.mark.usefixtures("causes_alone")
 
 SPRING = Planted(cubic=-2.0)
 VIEWS = Beginnings, AfterBeginnings, WholeRuns
@@ -112,14 +114,14 @@ def test_what_acts_later_on_is_found_beside_what_acts_from_the_beginning() -> No
 
 def test_whole_runs_decide_where_the_runs_differ_by_chance() -> None:
     deviations, runs = np.random.default_rng(5), []
-    for seed in range(3):
+    for seed in range(2):
         for run in driven("moment", SPRING, seed).runs:
             assert run.spring_stiffness is not None
             stated = run.spring_stiffness * (1.0 + 0.004 * deviations.standard_normal())
             runs.append(replace(run, id=f"{run.id}-{seed}", spring_stiffness=stated))
     data = replace(driven("moment", SPRING), runs=tuple(runs))
     kinds = [effect_class(name) for name in ("cubic_stiffness", "coulomb_friction", "stiffness_scatter")]
-    settings = cut_to(3 * COUNT)
+    settings = cut_to(2 * COUNT)
     found = investigate(data, kinds, settings=settings, views=VIEWS, rivals=())
     assert found.causes == ("cubic_stiffness", "stiffness_scatter")
     assert lengths(found, "coulomb_friction") == [run.reading.size for run in found.nominal.problem.data.runs]
@@ -136,4 +138,4 @@ def test_free_decays_are_viewed_whole() -> None:
     settings = cut_to(3000)
     cause = effect_from("quadratic_damping", {"coefficient": 0.003})
     with pytest.raises(ValueError, match="no view of the runs applies"):
-        investigate(campaign(cause), settings=settings, views=(Beginnings,))
+        investigate(campaign(cause, conditions=FOUR), (), settings=settings, views=(Beginnings,))

@@ -21,6 +21,8 @@ from tunnel_sim.effects import Effect, effect_from
 from tunnel_sim.vocabulary.between_runs import Repeatability
 from tunnel_sim.vocabulary.campaign import Campaign
 
+pytestmark = pytest.mark.usefixtures("causes_alone")
+
 STATED = tuple((spring, speed) for spring in (16.12, 21.02, 44.84) for speed in (0.0, 13.9, 19.4))
 SOFT, BY = 44.84, 0.03
 WIND, SPRING = 0.003, 0.0005
