@@ -156,9 +156,16 @@ def test_noise_of_any_colour_repeats_itself_at_the_stated_rate_at_most(name):
     assert binom.ppf(1e-3, trials, 0.05) <= alarms <= binom.ppf(1.0 - 1e-3, trials, 0.05)
 
 
-@pytest.mark.parametrize("name", COLOURS)
 @pytest.mark.parametrize(
-    "effect", [effect_class("coulomb_friction")(0.003), effect_class("cubic_stiffness")(0.3)]
+    ("name", "effect"),
+    [
+        ("ar1", effect_class("coulomb_friction")(0.003)),
+        ("ar2", effect_class("cubic_stiffness")(0.3)),
+        ("pink", effect_class("coulomb_friction")(0.003)),
+        slow("ar1", effect_class("cubic_stiffness")(0.3)),
+        slow("ar2", effect_class("coulomb_friction")(0.003)),
+        slow("pink", effect_class("cubic_stiffness")(0.3)),
+    ],
 )
 def test_an_effect_beneath_coloured_noise_is_still_a_gap(name, effect):
     fit, noise, found = judged(coloured(campaign(effect, duration=10.0), name))
