@@ -21,13 +21,13 @@ from diagnosis.search.weigh import weigh
 from diagnosis.settings import Settings
 from tests.marks import slow
 from tests.support import gap_campaigns
-from tests.support.gap_campaigns import INTERVAL, added, nominal, whole_runs
+from tests.support.gap_campaigns import FOUR, INTERVAL, added, nominal, whole_runs
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
 from tunnel_sim.effects.base import NEAR_MOTION
 
 DURATION = 6.0
 SWING = (-0.3, 0.3)  # rad
-campaign = partial(gap_campaigns.campaign, duration=DURATION)
+campaign = partial(gap_campaigns.campaign, duration=DURATION, conditions=FOUR)
 FEW = tuple(
     effect_class(name)
     for name in (
@@ -323,7 +323,7 @@ def test_forms_are_tried_only_where_they_could_win_and_once(monkeypatch: pytest.
 def test_friction_takes_the_form_that_the_runs_ask_for(form, freed) -> None:
     """One form of several, at its own values."""
     friction = effect_from("coulomb_friction", {"friction_moment": 0.008, **form})
-    base = nominal(gap_campaigns.campaign(friction, duration=10.0))
+    base = nominal(campaign(friction, duration=10.0))
     (lead,) = starting_points(base, type(friction))
     textbook = Hypothesis(("coulomb_friction",), fit(lead.problem, lead.point, base=base))
     assert not within_noise(textbook.fit)
@@ -355,7 +355,7 @@ def test_instants_are_sought_again_beside_a_form() -> None:
     """Beside friction without presliding, further instants follow the error of its frequency."""
     friction = effect_from("coulomb_friction", {"friction_moment": 0.003, "presliding": 0.008})
     lost = effect_from("dropped_samples", {"lost_time": 0.002})
-    base = nominal(gap_campaigns.campaign(friction, lost, duration=10.0))
+    base = nominal(campaign(friction, lost, duration=10.0))
     found = grow(whole_runs(base, [type(friction), type(lost)]))[0]
     assert found.names == ("coulomb_friction", "dropped_samples")
     assert found.fit.problem.free_forms == ("coulomb_friction.presliding",)
