@@ -17,7 +17,7 @@ from diagnosis.model.parameters import Point
 from tests.marks import slow
 from tests.reference.rigs import rig
 from tunnel_reference.draw import CampaignDraw
-from tunnel_reference.integrator import integrate
+from tunnel_reference.integrator import RodMotion, integrate
 from tunnel_reference.make import as_campaign
 from tunnel_reference.readings import read_motion
 from tunnel_reference.severity import Simulated
@@ -43,10 +43,17 @@ def conditions(compliance: float, share: float, *, driven: bool, noise: float) -
 
 
 @lru_cache
+def moved(compliance: float, share: float, *, driven: bool) -> RodMotion:
+    """The motion in the independent simulator, at six steps per radian of the rod's own oscillation."""
+    (motion,) = integrate([conditions(compliance, share, driven=driven, noise=0.0)], [[]], substeps=5)
+    return motion
+
+
+@lru_cache
 def problem(compliance: float, share: float, *, driven: bool, noise: float = 4e-4) -> Problem:
     """The nominal model and a rod, to be fitted to what the independent simulator gives."""
     given = conditions(compliance, share, driven=driven, noise=noise)
-    (motion,) = integrate([given], [[]], substeps=10)
+    motion = moved(compliance, share, driven=driven)
     readings = read_motion(given, motion, [], np.random.default_rng(3))
     simulated = Simulated(CampaignDraw("single", given, (), 0), readings, 0.0, np.zeros(3), readings.T)
     campaign = as_campaign(simulated, "rod")
