@@ -27,7 +27,7 @@ from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorP
 from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.record import Array, Record
 
-pytestmark = pytest.mark.usefixtures("causes_alone")
+pytestmark = pytest.mark.usefixtures("causes_alone", "models_in_this_process")
 
 MODEL = robot(TRUE, axis=LEVEL, tip=0.2)
 INERTIA, WEIGHT, DAMPING = inertia(MODEL), 9.81 * (1.5 * 0.2 + 0.2 * 0.4), 0.4  # kg m2, N m, N m s/rad

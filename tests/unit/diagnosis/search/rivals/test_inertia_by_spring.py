@@ -11,6 +11,7 @@ from diagnosis import diagnose
 from diagnosis.findings.next_steps import next_steps
 from diagnosis.search.answer import UNKNOWN
 from diagnosis.search.rivals.inertia_by_spring import InertiaBySpring
+from diagnosis.search.rivals.two_springs import TwoSprings
 from tests.support.gap_campaigns import CN_BETA, CN_R, DAMPING, INERTIA, NOISE, nominal
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
@@ -46,7 +47,7 @@ def decays(
 
 
 def test_an_inertia_that_differs_by_spring_is_unknown_and_said_with_its_size() -> None:
-    found = diagnose(decays(BY_SPRING), kinds=KINDS[::2])
+    found = diagnose(decays(BY_SPRING), kinds=KINDS[::2], rivals=(TwoSprings(), InertiaBySpring()))
     assert tuple(found.causes) == UNKNOWN
     assert "An inertia that differs from spring to spring would explain the gap: −0.33" in found.verdict
     assert "Two springs" not in found.verdict  # these leave much more

@@ -9,6 +9,7 @@ from scipy.linalg import expm
 
 from diagnosis import diagnose
 from diagnosis.search.answer import UNKNOWN
+from diagnosis.search.rivals.second_inertia import TwoInertias
 from tests.marks import slow
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
@@ -93,7 +94,7 @@ def near(stated, truth):
 
 
 def test_a_link_behind_a_spring_shows_both_frequencies_and_the_ratio_at_the_motor():
-    found = diagnose(joint(two_inertias()), kinds=KINDS[:3])
+    found = diagnose(joint(two_inertias()), kinds=KINDS[:3], rivals=(TwoInertias(),))
     assert tuple(found.causes) == UNKNOWN
     figures = second_inertia(found)
     assert near(figures["resonance"], RESONANCE)
@@ -105,7 +106,7 @@ def test_a_link_behind_a_spring_shows_both_frequencies_and_the_ratio_at_the_moto
 
 @pytest.mark.slow
 def test_at_the_link_there_is_no_antiresonance():
-    found = diagnose(joint(two_inertias(), sensor=1), kinds=KINDS[:-1])
+    found = diagnose(joint(two_inertias(), sensor=1), kinds=KINDS[:-1], rivals=(TwoInertias(),))
     assert tuple(found.causes) == UNKNOWN
     figures = second_inertia(found)
     assert near(figures["resonance"], RESONANCE)
@@ -124,6 +125,6 @@ def test_at_the_link_there_is_no_antiresonance():
     ids=["lag", "delay", "clipped", "coloured noise"],
 )
 def test_one_inertia_is_not_called_two(single):
-    found = diagnose(joint(one_inertia(), **single), kinds=KINDS[:3])
+    found = diagnose(joint(one_inertia(), **single), kinds=KINDS[:3], rivals=(TwoInertias(),))
     assert second_inertia(found) is None
     assert "second inertia" not in found.verdict
