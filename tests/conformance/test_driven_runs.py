@@ -240,7 +240,7 @@ def test_what_is_planted_is_named_with_its_size(
     name: str, cause: str, planted: Planted, truth: dict[str, float]
 ) -> None:
     kinds = vocabulary(MODES if cause == "second_mode" else LAWS)
-    found = diagnose(driven(name, planted), kinds=kinds)
+    found = diagnose(driven(name, planted), kinds=kinds, rivals=())
     assert found.causes == (cause,)
     assert found.gap.closed > 0.95
     parameters = found.candidates[0].parameters

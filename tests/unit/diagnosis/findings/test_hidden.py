@@ -100,7 +100,9 @@ def test_cn_r_without_a_named_lag_is_the_derivative_in_phase_with_the_rate(lag):
 def test_the_upper_limit_of_a_lag_beside_scatter_is_confirmed_by_a_refit():
     """Chance differences absorb the second order of a small lag; linear theory alone allows ten times as much."""
     kind = effect_class("unsteady_aero_lag")
-    chosen = investigate(scattered(), [effect_class(name) for name in (*SCATTERED, kind.name)]).stated
+    chosen = investigate(
+        scattered(), [effect_class(name) for name in (*SCATTERED, kind.name)], rivals=()
+    ).stated
     assert chosen.problem.scatter
     (lag,) = hidden_effects(chosen, starts_beside(chosen, [kind]))
     assert lag.size.value > 0.0
@@ -229,6 +231,7 @@ def test_a_drop_that_no_refit_confirms_does_not_prevent_a_limit(monkeypatch):
     assert found.size.value == pytest.approx(limit, rel=0.2)
 
 
+@pytest.mark.usefixtures("causes_alone")
 def test_a_further_effect_that_coloured_noise_takes_up_is_said_to_be_significant():
     """A drift of 1.5 mrad in every run, beside vortices in coloured noise that is twice as large as the white."""
     shedding = effect_from("vortex_shedding", {"amplitude": 0.1, "strouhal_number": 0.12})
@@ -237,7 +240,7 @@ def test_a_further_effect_that_coloured_noise_takes_up_is_said_to_be_significant
         return 2.0 * NOISE * colour("ar2", count, rng) + 1.5e-3 * np.arange(count) / count
 
     kinds = [effect_class(name) for name in ("vortex_shedding", "sensor_drift", "coulomb_friction")]
-    found = diagnose(with_zero(campaign(shedding), zero), kinds=kinds)
+    found = diagnose(with_zero(campaign(shedding), zero), kinds=kinds, rivals=())
     assert found.causes == ("vortex_shedding",)
     assert found.rest.significant
     assert "Sensor drift is significant, but too small to be named." in found.verdict

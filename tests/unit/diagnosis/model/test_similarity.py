@@ -178,12 +178,12 @@ def twice_caused(quantity="angle"):
     )
     data = campaign(*causes, duration=6.0, quantity=quantity)
     data = dataclasses.replace(data, runs=data.runs[::2])
-    return data, investigate(data, FEW)
+    return data, investigate(data, FEW, rivals=())
 
 
 def assert_same_answer(data, first, time, moment):
     """The same causes with the same probabilities, and parameters that are stretched."""
-    found = investigate(stretched(data, time, moment), FEW)
+    found = investigate(stretched(data, time, moment), FEW, rivals=())
     assert found.causes == first.causes == ("coulomb_friction", "cubic_stiffness")
     assert found.similarity.time == pytest.approx(first.similarity.time / time, rel=1e-6)
     known = {answer.effects: answer.probability for answer in first.answers}
@@ -224,7 +224,7 @@ def test_a_factor_on_the_angles_leaves_the_causes(factor):
         dataclasses.replace(run, record=Record(run.record.time_s, run.record.yaw_rad * factor))
         for run in data.runs
     )
-    found = investigate(dataclasses.replace(data, sensor=sensor, runs=runs), FEW)
+    found = investigate(dataclasses.replace(data, sensor=sensor, runs=runs), FEW, rivals=())
     assert found.causes == first.causes
     known = {answer.effects: answer.probability for answer in first.answers}
     for answer in found.answers:
@@ -250,7 +250,7 @@ def test_a_factor_on_the_air_or_the_sizes_only_divides_the_coefficients(key, fac
         )
         return dataclasses.replace(data, runs=tuple(runs))
 
-    one, other = (investigate(stated(scale), kinds) for scale in (1.0, factor))
+    one, other = (investigate(stated(scale), kinds, rivals=()) for scale in (1.0, factor))
     assert one.causes == other.causes == ()
     assert other.nominal.total == pytest.approx(one.nominal.total, rel=1e-6)
     for name in ("cn_beta", "cn_r"):

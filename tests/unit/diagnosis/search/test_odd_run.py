@@ -147,7 +147,7 @@ def test_a_cause_of_all_runs_accuses_none() -> None:
         for run in campaign(duration=6.0).runs
         for own in [rng.normal(0.0, NOISE, run.record.yaw_rad.size)]
     ]
-    found = investigate(replace(cubic, runs=(*small[:4], cubic.runs[4], small[5])), FEW)
+    found = investigate(replace(cubic, runs=(*small[:4], cubic.runs[4], small[5])), FEW, rivals=())
     assert found.disturbed == ()
     assert found.causes == ("cubic_stiffness",)
     assert found.single == {"cubic_stiffness": "r5"}
@@ -160,14 +160,14 @@ def test_a_run_that_spoils_the_fit_of_two_causes_is_left_out() -> None:
     causes = {"sensor_clipping": {"limit": 0.25}, "coulomb_friction": {"friction_moment": 0.003}}
     data = campaign(*(effect_from(name, given) for name, given in causes.items()), duration=6.0)
     amplified = spoilt(data, "r5", lambda yaw: yaw / 1.3)
-    found = investigate(amplified, tuple(map(effect_class, causes)))
+    found = investigate(amplified, tuple(map(effect_class, causes)), rivals=())
     assert [(one.run, one.left_out) for one in found.disturbed] == [("r5", True)]
     assert found.causes == tuple(sorted(causes))
 
 
 @pytest.fixture(scope="module")
 def answer(plain: Campaign) -> Diagnosis:
-    return diagnose(spoilt(plain, "r5", clipped), kinds=FEW)
+    return diagnose(spoilt(plain, "r5", clipped), kinds=FEW, rivals=())
 
 
 def test_the_words_name_the_odd_run(answer: Diagnosis) -> None:
