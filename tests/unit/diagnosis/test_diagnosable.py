@@ -106,7 +106,7 @@ def friction(settings, *, bare):
 
 def test_without_a_spring_a_moment_is_per_unit_inertia():
     data, expected = friction([Setting(16.12, 0.0)] * 2, bare=(0, 1))
-    answer = diagnose(data, kinds=vocabulary(["coulomb_friction", "quadratic_damping"]))
+    answer = diagnose(data, kinds=vocabulary(["coulomb_friction", "quadratic_damping"]), rivals=())
     assert answer.causes == ("coulomb_friction",)
     found = answer.candidates[0].parameters["friction_moment"]
     assert found.unit == "rad/s2"
@@ -116,7 +116,7 @@ def test_without_a_spring_a_moment_is_per_unit_inertia():
 
 
 def test_runs_left_out_are_in_the_cautions_and_not_in_the_gap():
-    answer = diagnose(decays(PAIR, bare=(5,)), kinds=vocabulary(["sensor_drift"]))
+    answer = diagnose(decays(PAIR, bare=(5,)), kinds=vocabulary(["sensor_drift"]), rivals=())
     assert [run.id for run in answer.gap.runs] == ["r01", "r02", "r03", "r04", "r05"]
     assert any("r06" in text and "Left out" in text for text in answer.cautions)
     assert answer.causes == ()
@@ -125,7 +125,7 @@ def test_runs_left_out_are_in_the_cautions_and_not_in_the_gap():
 
 def test_unlike_springs_that_are_not_stated_are_no_gap():
     """Fitted together they would be a gap of thousands of noise variances."""
-    answer = diagnose(decays(PAIR, bare=range(6)), kinds=vocabulary(["sensor_drift"]))
+    answer = diagnose(decays(PAIR, bare=range(6)), kinds=vocabulary(["sensor_drift"]), rivals=())
     assert answer.causes == ()
     assert any("may have another spring" in text for text in answer.cautions)
 
@@ -163,7 +163,7 @@ def test_one_short_run_is_left_out_and_does_not_refuse_the_others(given):
 def test_a_diagnosis_states_the_short_run_that_it_leaves_out():
     data = driven("moment")
     given = replace(data, runs=(*data.runs, cut(data.runs[0], 150, "short")))
-    found = diagnose(given, kinds=vocabulary(("coulomb_friction",)))
+    found = diagnose(given, kinds=vocabulary(("coulomb_friction",)), rivals=())
     assert found.causes == ()
     assert found.remarks[0].runs == ("short",)
     assert [run.id for run in found.gap.runs] == [run.id for run in data.runs]

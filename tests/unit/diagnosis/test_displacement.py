@@ -65,7 +65,7 @@ def case(request: pytest.FixtureRequest) -> tuple[Diagnosis, Campaign, str, floa
     """A diagnosed campaign."""
     cause, truth, force, hertz, release = CASES[request.param]
     campaign = linear_campaign(0.2, (hertz, 1.6 * hertz), (release, 0.5 * release), force)
-    return diagnose(campaign), campaign, cause, truth
+    return diagnose(campaign, rivals=()), campaign, cause, truth
 
 
 def test_the_cause_is_found_with_its_size(case: tuple[Diagnosis, Campaign, str, float]) -> None:
@@ -206,14 +206,14 @@ def scaled(campaign: Campaign, factor: float) -> Campaign:
 @cache
 def damped_by_the_square(quantity: Quantity) -> tuple[Campaign, Diagnosis]:
     found = linear_campaign(2.0, (3.0, 5.0), (0.3, 0.15), square, quantity=quantity)
-    return found, diagnose(found, kinds=FEW)
+    return found, diagnose(found, kinds=FEW, rivals=())
 
 
 @pytest.mark.parametrize("quantity", ["angle", slow("rate")])
 def test_an_angle_and_its_twin_have_the_same_numbers(quantity: Quantity) -> None:
     """Bit for bit, with other units; where the motion has the size of a rig's angle."""
     displaced, own = damped_by_the_square(quantity)
-    twin = diagnose(displaced.as_angle, kinds=FEW, model=StillAir())
+    twin = diagnose(displaced.as_angle, kinds=FEW, model=StillAir(), rivals=())
     assert own.causes == twin.causes == ("quadratic_damping",)
     offered = {name: value for name, value in twin.inclusion.items() if name in own.inclusion}
     twin = replace(twin, inclusion=offered)  # of effects that no displacement has the probability is 0
@@ -228,7 +228,7 @@ def test_an_angle_and_its_twin_have_the_same_numbers(quantity: Quantity) -> None
 def test_the_size_of_the_motion_changes_no_digit() -> None:
     """A motion of 1/1024 has the same answer, and every number is multiplied by a power of 1024."""
     usual, answer = damped_by_the_square("angle")
-    shrunk = diagnose(scaled(usual, 2.0**-10), kinds=FEW)
+    shrunk = diagnose(scaled(usual, 2.0**-10), kinds=FEW, rivals=())
     large, small = (dict(numbers(one.to_json_dict())) for one in (answer, shrunk))
     assert large.keys() == small.keys()
     powers = {
@@ -247,7 +247,7 @@ def test_the_size_of_the_motion_changes_no_digit() -> None:
 
 
 def test_no_effect_of_the_air_is_offered() -> None:
-    answer = diagnose(linear_campaign(5.0, (2.0, 3.2), (0.02, 0.01), no_force))
+    answer = diagnose(linear_campaign(5.0, (2.0, 3.2), (0.02, 0.01), no_force), rivals=())
     assert answer.causes == ()
     assert "rod_flexibility" not in answer.inclusion
     assert not any("air" in clause for clause in answer.blind_spots)

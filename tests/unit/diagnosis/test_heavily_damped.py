@@ -25,6 +25,6 @@ FEW = vocabulary(["coulomb_friction", "quadratic_damping", "cubic_stiffness", "s
 def test_a_heavily_damped_rig_is_diagnosed_like_any_other(name, parameters, kinds):
     """Of damping ratios 0.18 and 0.11, by spring."""
     effects = () if name is None else (effect_from(name, parameters),)
-    found = diagnose(campaign(*effects, damping=0.48), kinds=kinds)
+    found = diagnose(campaign(*effects, damping=0.48), kinds=kinds, rivals=())
     assert found.causes == (() if name is None else (name,))
     assert found.coefficients.after["cn_beta"].value == pytest.approx(CN_BETA, rel=2e-3)

@@ -50,7 +50,7 @@ def held(hold: Hold | None) -> Campaign:
 
 
 def test_a_guessed_hold_is_said_as_the_second_reading_of_the_delay() -> None:
-    answer = diagnose(held(None), kinds=FEW)
+    answer = diagnose(held(None), kinds=FEW, rivals=())
     assert answer.causes == (DELAY.name,)
     assert answer.candidates[0].parameters["delay"].value == pytest.approx(HALF, rel=0.05)
     assert headline(answer)[0] == "input delay or wrong hold"
@@ -60,19 +60,19 @@ def test_a_guessed_hold_is_said_as_the_second_reading_of_the_delay() -> None:
 
 
 def test_a_hold_that_is_stated_wrongly_is_said_too() -> None:
-    said = diagnose(held("linear"), kinds=FEW).verdict
+    said = diagnose(held("linear"), kinds=FEW, rivals=()).verdict
     assert "One cause has two interpretations" in said
     assert "as the campaign states" in said
 
 
 def test_the_right_hold_has_no_delay() -> None:
-    assert diagnose(held("zero"), kinds=FEW).causes == ()
+    assert diagnose(held("zero"), kinds=FEW, rivals=()).causes == ()
 
 
 def test_a_smooth_input_that_is_stated_as_held_seems_early() -> None:
     smooth = campaign()
     runs = tuple(replace(run, drive=replace(run.drive, hold="zero")) for run in smooth.runs)
-    answer = diagnose(replace(smooth, runs=runs), kinds=FEW)
+    answer = diagnose(replace(smooth, runs=runs), kinds=FEW, rivals=())
     assert answer.causes == (DELAY.name,)
     assert "acts 1 ms earlier than recorded, about half a sample (1 ms); or it is linear" in answer.verdict
     assert any('state drive_hold = "linear" for the runs' in step for step in next_steps(answer))

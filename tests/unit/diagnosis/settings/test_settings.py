@@ -164,7 +164,8 @@ def test_the_settings_given_decide_and_are_in_the_document():
     given = {"gap.detection_rate": 1e3}
     kinds = vocabulary(["quadratic_damping"])
     usual, changed = (
-        diagnose(data, kinds=kinds, settings=Settings().changed(one)).to_json_dict() for one in ({}, given)
+        diagnose(data, kinds=kinds, rivals=(), settings=Settings().changed(one)).to_json_dict()
+        for one in ({}, given)
     )
     assert (usual["provenance"]["settings"], changed["provenance"]["settings"]) == ({}, given)
     assert (usual["gap"]["detected"], changed["gap"]["detected"]) == (False, True)

@@ -137,9 +137,10 @@ class Wake(Periodic):
                 runs["shedding_phase"][place] = effect.drawn_number(own)
 
 
+@pytest.mark.usefixtures("causes_alone")
 def test_a_line_of_ones_own_is_found_with_a_phase_in_every_run() -> None:
     built_in = [effect_class(name) for name in ("coulomb_friction", "quadratic_damping", "second_mode")]
-    found = diagnose(campaign(Wake(0.5, 0.23)), kinds=[*built_in, Wake])
+    found = diagnose(campaign(Wake(0.5, 0.23)), kinds=[*built_in, Wake], rivals=())
     assert found.causes == ("wake",)
     number = found.candidates[0].parameters["number"]
     assert number.std is not None
@@ -224,7 +225,7 @@ def hardened() -> dict[str, Diagnosis]:
     data = dataclasses.replace(data, runs=data.runs[::2])
     others = tuple(effect_class(name) for name in ("coulomb_friction", "sensor_drift"))
     return {
-        kind.name: diagnose(data, kinds=(kind, *others))
+        kind.name: diagnose(data, kinds=(kind, *others), rivals=())
         for kind in (effect_class("cubic_stiffness"), OwnCubic, CUBIC)
     }
 
