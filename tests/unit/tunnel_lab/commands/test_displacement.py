@@ -37,7 +37,7 @@ def files(tmp_path: Path) -> dict[Path, float]:
     return found
 
 
-@pytest.mark.usefixtures("undrawn", "unrendered")
+@pytest.mark.usefixtures("causes_alone", "undrawn", "unrendered")
 def test_import_identify_diagnose_report(tunnel: Tunnel, files: dict[Path, float], tmp_path: Path) -> None:
     table = tmp_path / "springs.csv"
     table.write_text("file,spring_stiffness\n" + "".join(f"{one.name},{k!r}\n" for one, k in files.items()))
@@ -76,6 +76,7 @@ def test_import_identify_diagnose_report(tunnel: Tunnel, files: dict[Path, float
         assert not re.search(FORBIDDEN, text), re.findall(rf".{{0,40}}(?:{FORBIDDEN}).{{0,40}}", text)
 
 
+@pytest.mark.usefixtures("causes_alone")
 @pytest.mark.parametrize(
     ("heading", "per_newton"),
     [("force (N)", 1.0), slow("base acceleration (g)", -1.0 / (MASS * 9.80665))],
