@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -39,7 +40,10 @@ def driven(force: np.ndarray) -> np.ndarray:
     return np.asarray(found.y[0])
 
 
-READING = driven(PUSH) + 3e-5 * np.random.default_rng(4).standard_normal(TIME.size)
+@cache
+def reading() -> np.ndarray:
+    """Of the cart under the push, m."""
+    return driven(PUSH) + 3e-5 * np.random.default_rng(4).standard_normal(TIME.size)
 
 
 def file_of(folder: Path, heading: str, *columns: np.ndarray) -> Path:
@@ -80,10 +84,10 @@ def test_an_input_is_read_in_si(
     tmp_path: Path, heading: str, input_factor: float, column: str, si: float
 ) -> None:
     """By name and unit: a force, the spring's root, a servo's command, the acceleration of the base."""
-    found = read_records([file_of(tmp_path, heading, 1e3 * READING, input_factor * PUSH)])
+    found = read_records([file_of(tmp_path, heading, 1e3 * reading(), input_factor * PUSH)])
     (run,) = found.campaign.runs
     assert found.campaign.sensor.motion == "displacement"
-    np.testing.assert_allclose(run.record.yaw_rad, READING, rtol=1e-6, atol=1e-11)
+    np.testing.assert_allclose(run.record.yaw_rad, reading(), rtol=1e-6, atol=1e-11)
     assert run.drive is not None
     assert run.drive.column == column
     np.testing.assert_allclose(run.drive.values, si * PUSH, rtol=1e-6, atol=1e-11)
@@ -93,7 +97,7 @@ def test_an_input_is_read_in_si(
 def test_it_is_written_under_its_own_name_and_read_again(tmp_path: Path) -> None:
     choices = ImportChoices(input_hold="zero")
     import_records(
-        [file_of(tmp_path, "time (s),x (mm),force (N)", 1e3 * READING, PUSH)], tmp_path / "c", choices
+        [file_of(tmp_path, "time (s),x (mm),force (N)", 1e3 * reading(), PUSH)], tmp_path / "c", choices
     )
     assert (tmp_path / "c/runs/log.csv").read_text().startswith("time_s,x_m,force_n\n")
     (run,) = read_campaign(tmp_path / "c").runs
@@ -105,8 +109,8 @@ def test_it_is_written_under_its_own_name_and_read_again(tmp_path: Path) -> None
 
 def test_a_velocity_is_no_wind(tmp_path: Path) -> None:
     """In a log beside displacement and force."""
-    speed = np.gradient(READING, TIME)
-    path = file_of(tmp_path, "time (s),x (mm),v (m/s),force (N)", 1e3 * READING, speed, PUSH)
+    speed = np.gradient(reading(), TIME)
+    path = file_of(tmp_path, "time (s),x (mm),v (m/s),force (N)", 1e3 * reading(), speed, PUSH)
     found = read_records([path])
     assert found.campaign.runs[0].drive is not None
     assert "wind" not in said(found)
@@ -115,7 +119,7 @@ def test_a_velocity_is_no_wind(tmp_path: Path) -> None:
 def test_conditions_in_columns_have_own_names_and_units(tmp_path: Path) -> None:
     one = np.ones_like(TIME)
     path = file_of(
-        tmp_path, "time (s),x (mm),force (N),k (N/mm),mass (kg)", 1e3 * READING, PUSH, 0.05 * one, 2.0 * one
+        tmp_path, "time (s),x (mm),force (N),k (N/mm),mass (kg)", 1e3 * reading(), PUSH, 0.05 * one, 2.0 * one
     )
     found = read_records([path]).campaign
     assert found.rig.yaw_inertia == pytest.approx(2.0)
@@ -123,7 +127,7 @@ def test_conditions_in_columns_have_own_names_and_units(tmp_path: Path) -> None:
 
 
 def test_an_input_is_stated_under_its_own_name(tmp_path: Path) -> None:
-    path = file_of(tmp_path, "time,signal,f", 1e3 * READING, PUSH)
+    path = file_of(tmp_path, "time,signal,f", 1e3 * reading(), PUSH)
     choices = {"angle": ("signal",), "unit": "mm", "input": "f"}
     drive = read_records([path], ImportChoices(**choices, input_as="force_n")).campaign.runs[0].drive
     assert drive is not None
@@ -137,16 +141,18 @@ def test_an_input_is_stated_under_its_own_name(tmp_path: Path) -> None:
 
 
 def test_two_displacements_are_asked_for_in_own_words(tmp_path: Path) -> None:
-    path = file_of(tmp_path, "time (s),x1 (mm),x2 (mm)", 1e3 * READING, 1e3 * READING + np.sin(TIME))
+    path = file_of(tmp_path, "time (s),x1 (mm),x2 (mm)", 1e3 * reading(), 1e3 * reading() + np.sin(TIME))
     with pytest.raises(TunnelError, match=r'2 columns may be the displacement: .*; give --angle "x1'):
         read_records([path])
 
 
 def test_a_force_beside_an_angle_stays_out(tmp_path: Path) -> None:
     """Of an angle the unit N shows no input, and a moment does."""
-    (run,) = read_records([file_of(tmp_path, "time (s),yaw (rad),force (N)", READING, PUSH)]).campaign.runs
+    (run,) = read_records([file_of(tmp_path, "time (s),yaw (rad),force (N)", reading(), PUSH)]).campaign.runs
     assert run.drive is None
-    (run,) = read_records([file_of(tmp_path, "time (s),yaw (rad),torque (Nm)", READING, PUSH)]).campaign.runs
+    (run,) = read_records(
+        [file_of(tmp_path, "time (s),yaw (rad),torque (Nm)", reading(), PUSH)]
+    ).campaign.runs
     assert run.drive is not None
     assert run.drive.column == "moment_nm"
 
@@ -154,11 +160,11 @@ def test_a_force_beside_an_angle_stays_out(tmp_path: Path) -> None:
 def test_a_table_of_conditions_has_own_names_and_units(tmp_path: Path) -> None:
     table = tmp_path / "runs.csv"
     table.write_text("file,k (N/mm),release_displacement (mm)\nlog.csv,0.05,20\n")
-    path = file_of(tmp_path, "time (s),x (mm),force (N)", 1e3 * READING, PUSH)
+    path = file_of(tmp_path, "time (s),x (mm),force (N)", 1e3 * reading(), PUSH)
     (run,) = read_records([path], conditions=table).campaign.runs
     assert run.spring_stiffness == pytest.approx(50.0)
     assert run.release_angle == pytest.approx(0.02)
-    path = file_of(tmp_path, "time (s),yaw (rad),torque (Nm)", READING, PUSH)
+    path = file_of(tmp_path, "time (s),yaw (rad),torque (Nm)", reading(), PUSH)
     with pytest.raises(
         TunnelError, match=r"'k \(N/mm\)' is of a displacement, and the readings are of an angle"
     ):
@@ -170,12 +176,12 @@ def test_a_prismatic_joint_of_a_robot_log(tmp_path: Path) -> None:
     stamps = START_NS + np.round(1e9 * TIME).astype(np.int64)
     messages = [
         ("/joint_states", JOINT_STATE, stamp, joint_state(stamp, ["slide"], [x], (), [force]))
-        for stamp, x, force in zip(stamps.tolist(), READING.tolist(), PUSH.tolist(), strict=True)
+        for stamp, x, force in zip(stamps.tolist(), reading().tolist(), PUSH.tolist(), strict=True)
     ]
     write_mcap(tmp_path / "slide.mcap", messages)
     choices = ImportChoices(unit="m", input_as="force_n")
     (run,) = read_records([tmp_path / "slide.mcap"], choices).campaign.runs
-    np.testing.assert_allclose(run.record.yaw_rad, READING, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(run.record.yaw_rad, reading(), rtol=1e-9, atol=1e-12)
     assert run.drive is not None
     assert run.drive.column == "moment_nm"
     np.testing.assert_allclose(run.drive.values, PUSH)
@@ -188,7 +194,7 @@ def test_a_prismatic_joint_of_a_robot_log(tmp_path: Path) -> None:
 def test_a_stiffness_is_stated_in_a_unit_of_the_motion(tmp_path: Path, setting: str, si: float) -> None:
     stated, _ = parse_setting(f"spring_stiffness={setting}", "--set")
     choices = ImportChoices(conditions=stated)
-    path = file_of(tmp_path, "time (s),x (mm),force (N)", 1e3 * READING, PUSH)
+    path = file_of(tmp_path, "time (s),x (mm),force (N)", 1e3 * reading(), PUSH)
     assert read_records([path], choices).campaign.runs[0].spring_stiffness == pytest.approx(si)
     import_records([path], tmp_path / "c", choices)
     assert read_recipe(tmp_path / "c").conditions == stated
@@ -206,7 +212,7 @@ def test_a_stiffness_in_a_unit_of_the_other_motion_is_refused(
     tmp_path: Path, unit: str, heading: str, motions: tuple[str, str]
 ) -> None:
     stated, _ = parse_setting(f"spring_stiffness=50 {unit}", "--set")
-    path = file_of(tmp_path, heading, 1e3 * READING, PUSH)
+    path = file_of(tmp_path, heading, 1e3 * reading(), PUSH)
     with pytest.raises(TunnelError, match=f"motion = '{motions[0]}', and the readings are of '{motions[1]}'"):
         read_records([path], ImportChoices(conditions=stated))
 
@@ -219,7 +225,7 @@ def test_units_of_both_motions_are_named_for_a_unit_of_neither() -> None:
 
 
 def test_a_mass_of_an_angle_is_asked_about(tmp_path: Path) -> None:
-    path = file_of(tmp_path, "time (s),signal", READING)
+    path = file_of(tmp_path, "time (s),signal", reading())
     with pytest.raises(TunnelError, match=r"'mass' is stated, .*; give yaw_inertia, or state --unit m$"):
         read_records([path], ImportChoices(conditions=Conditions(mass=2.0)))
 
@@ -229,5 +235,5 @@ def test_the_picture_names_the_input_as_the_campaign_does(
 ) -> None:
     labels: list[str] = []
     monkeypatch.setattr(Axes, "set_ylabel", lambda _, text, **__: labels.append(text))
-    import_picture(read_records([file_of(tmp_path, "time (s),x (mm),force (N)", 1e3 * READING, PUSH)]))
+    import_picture(read_records([file_of(tmp_path, "time (s),x (mm),force (N)", 1e3 * reading(), PUSH)]))
     assert set(labels) == {"reading [m]", "input force_n"}
