@@ -106,4 +106,5 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Reports without pictures: drawing takes most of the time, and has tests of its own."""
     from tunnel_lab.report import page
 
+    monkeypatch.setattr(page, "diagnosis_figures", lambda answer: dict.fromkeys(answer.pictures))
     monkeypatch.setattr(page, "inline_svg", lambda *_: "")
