@@ -60,7 +60,7 @@ def driven(kind: str, column: str = "moment_nm", *, held: bool = False) -> Campa
     values *= {"moment_nm": 0.3, "base_rad": 0.01}[column] / values.std()
     given = DrivenInput(column, values, np.full(4, held), np.full(4, 0.1))
     c = replace(RIG, drive=given)
-    (motion,) = integrate([c], [[]], substeps=8)
+    (motion,) = integrate([c], [[]], substeps=4)
     draw = CampaignDraw("none", c, (), 0)
     return make.as_campaign(Simulated(draw, motion.angle + c.zero, 0.0, np.zeros(4), np.zeros((0, 0))), kind)
 
