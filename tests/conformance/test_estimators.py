@@ -2,7 +2,7 @@
 
 import json
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -49,7 +49,7 @@ def examined_once():
         yield
 
 
-whole_campaign = cache(campaign)
+whole_campaign = cache(partial(campaign, rate=500.0))
 
 
 def noisy_campaign(**options):
