@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 import socket
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -36,22 +34,13 @@ def test_what_is_missing_is_said_in_one_line(
     assert not (tmp_path / "new").exists()
 
 
-def test_a_port_that_is_taken_is_refused(tmp_path: Path) -> None:
+def test_a_port_that_is_taken_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """Before anything is served: this process keeps its own application."""
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = str(taken.getsockname()[1])
-        words = [
-            sys.executable,
-            "-m",
-            "tunnel_lab.cli",
-            "bench",
-            str(tmp_path),
-            "--port",
-            port,
-            "--no-browser",
-        ]
-        done = subprocess.run(words, capture_output=True, text=True, timeout=60)
-    assert done.returncode == 2
-    assert done.stderr.startswith(f"tunnel: --port {port}: cannot be opened")
-    assert done.stderr.count("\n") == 1
+        assert cli.main(["bench", str(tmp_path), "--port", port, "--no-browser"]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith(f"tunnel: --port {port}: cannot be opened")
+    assert err.count("\n") == 1
