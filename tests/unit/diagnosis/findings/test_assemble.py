@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
+from diagnosis import _diagnose
 from diagnosis._diagnose import diagnose, vocabulary
 from diagnosis.answer.held_out import excess_base
 from diagnosis.compose import Confirmed, Question, composed
@@ -18,14 +19,14 @@ from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import investigate
 from tests.marks import slow
 from tests.support import gap_campaigns
-from tests.support.gap_campaigns import INTERVAL, answer, with_blow
+from tests.support.gap_campaigns import FOUR, INTERVAL, answer, with_blow
 from tunnel_lab.commands.about import schema_of
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
 
 DURATION = 6.0
-campaign = partial(gap_campaigns.campaign, duration=DURATION)
+campaign = partial(gap_campaigns.campaign, duration=DURATION, conditions=FOUR)
 NAMES = [kind.name for kind in ALL_EFFECTS]
 FEW = vocabulary(
     ["quadratic_damping", "coulomb_friction", "sensor_drift", "mains_hum", "sensor_quantisation"]
@@ -109,9 +110,17 @@ def test_runs_that_are_no_decays_have_no_trade_off_and_no_caveat_on_causes():
 
 @cache
 def named():
-    """The answer that names one effect, and the progress that was reported."""
-    steps = []
-    return diagnose(campaign(QUADRATIC), kinds=FEW, progress=steps.append), steps
+    """The answer that names one effect, the progress that was reported, and the study."""
+    steps, studies = [], []
+
+    def studied(*given, **options):
+        studies.append(investigate(*given, **options))
+        return studies[-1]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(_diagnose, "investigate", studied)
+        answer = diagnose(campaign(QUADRATIC), kinds=FEW, progress=steps.append)
+    return answer, steps, studies[0]
 
 
 _LONG = ("pair", "hum only", "hum and an effect", "coarse step only", "normalised, named")
@@ -162,7 +171,7 @@ def finely(data, noise, effect=QUADRATIC):
 
 @pytest.fixture(scope="module")
 def found():
-    return investigate(campaign(QUADRATIC), FEW)
+    return named()[2]
 
 
 @pytest.mark.slow
@@ -219,7 +228,7 @@ def test_records_without_noise_are_answered_with_a_status(effect, causes):
 
 
 def test_the_probability_in_words_is_that_of_the_first_candidate(found):
-    answer, _ = named()
+    answer = named()[0]
     assert f"(probability {100.0 * answer.candidates[0].probability:.0f} %)" in answer.verdict
     doubtful = replace(found, gap=replace(found.gap, test=replace(found.gap.test, p_value=9e-4)))
     (none,) = [c for c in candidates(doubtful, excess_base(doubtful)) if c.effect == "none"]
@@ -255,7 +264,7 @@ def test_the_chosen_fit_is_that_of_the_answer(found):
 
 
 def test_progress_is_reported_and_steps_are_timed():
-    answer, steps = named()
+    answer, steps, _ = named()
     assert {"noise", "nominal fit", "effects", "quadratic_damping"} <= set(steps)
     assert set(answer.seconds) >= {"noise", "nominal fit", "effects"}
     assert all(seconds >= 0.0 for seconds in answer.seconds.values())
