@@ -54,7 +54,7 @@ whole_campaign = cache(partial(campaign, rate=500.0))
 
 def noisy_campaign(**options):
     rng = np.random.default_rng(11)
-    return campaign(TWELVE[:6], noise=5e-4, resolution=RESOLUTION, rate=500.0, rng=rng, **options)
+    return campaign(TWELVE[:6], noise=5e-4, resolution=RESOLUTION, rate=250.0, rng=rng, **options)
 
 
 @pytest.fixture(scope="module")
@@ -222,7 +222,7 @@ SOFTER = {16.12: 16.12, 21.02: 21.02, 44.84: 40.36}
 def contradictory(case):
     settings, change = CONTRADICTIONS[case]
     rng, truth = np.random.default_rng(5), TRUTHS.get(case)
-    data = campaign(settings, truth=truth, noise=5e-4, rng=rng, duration=6.0, rate=500.0)
+    data = campaign(settings, truth=truth, noise=5e-4, rng=rng, duration=6.0, rate=250.0)
     return replace(data, runs=tuple(replace(run, **change(run)) for run in data.runs))
 
 
@@ -250,7 +250,7 @@ def test_a_contradiction_that_is_said_widens_the_intervals(name, case):
 @pytest.mark.parametrize("slip", [1e3, slow(1.0 / 3600.0)])
 def test_coefficients_are_withheld_where_the_springs_contradict_the_inertia_by_decades(name, slip):
     settings = TWO_SPRINGS[::2]
-    data = campaign(settings, noise=5e-4, rng=np.random.default_rng(5), duration=6.0, rate=500.0)
+    data = campaign(settings, noise=5e-4, rng=np.random.default_rng(5), duration=6.0, rate=250.0)
     stated = replace(data, rig=replace(data.rig, yaw_inertia=Truth().yaw_inertia / slip))
     found = identify(stated, name, throw=False)
     assert Status.COEFFICIENTS_WITHHELD in found.statuses
@@ -324,7 +324,7 @@ def test_without_size_the_air_is_dimensional(name, of_noisy):
 def without_a_decay(kind):
     rng = np.random.default_rng(2)
     level = 0.0 if kind == "constant" else 5e-4
-    short = campaign(TWELVE[:2], duration=3.0)
+    short = campaign(TWELVE[:2], duration=3.0, rate=500.0)
     dead = with_records(short, lambda time, _: 0.1 + level * rng.standard_normal(time.size))
     # One dead run twice would be one record under two springs.
     return replace(dead, runs=dead.runs[:1]) if kind == "constant" else dead
