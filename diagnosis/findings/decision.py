@@ -35,8 +35,8 @@ SIZE_ODDS: Final = 10.0
 is not common to the runs is some ten times as frequent in false answers as in right ones."""
 STILL_AIR_LEAVES: Final = 0.02
 """Maximum share of the gap in still air that the steady causes beside a random moment leave in these runs
-alone, for a decided answer. Estimated. It is 0.003 at most in nine right answers to simulated campaigns, and
-0.05 in a false one. They are not an independent test."""
+alone, for a decided answer. Estimated. It is 0.003 at most for seven right sets of steady causes in simulated
+campaigns, and 0.05 in a false answer. They are not an independent test."""
 ANSWERS_NAMED: Final = 5
 """Maximum number of likely answers in a sentence. Judgement."""
 IN_COMMON: Final = 0.9
@@ -48,9 +48,8 @@ class Doubt:
     """A prediction by which a probable answer fails.
 
     Args:
-        kind: ``held out``, ``ahead``, ``patched``, ``under load``, ``left``, ``part``, ``size``, ``pattern``,
-            ``still air`` or
-            ``elsewhere``, as in `Predictions`.
+        kind: ``held out``, ``ahead``, ``patched``, ``under load``, ``left``, ``part``, ``size``, ``still air``,
+            ``pattern`` or ``elsewhere``, as in `Predictions`.
         share: the share found, a fraction; None for a doubt about the place.
     """
 
