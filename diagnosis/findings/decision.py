@@ -28,7 +28,7 @@ Estimated. It is 1.0 at most in 58 answers of several causes in simulated campai
 SIZE_DIFFERS: Final = 0.15
 """Minimum standard deviation of a cause's size between the runs, beyond its errors and as a share of the size, for
 its law not to be common to the runs. Estimated. In decided answers to simulated campaigns it is 0.05 at most where
-the causes are right, and 0.3 to 0.5 in five of ten false answers without the true cause; dry friction of a
+the causes are right, and 0.3 to 0.5 in five of eleven false answers without the true cause; dry friction of a
 measured pendulum differs by 0.25. They are not an independent test."""
 SIZE_ODDS: Final = 10.0
 """Minimum odds of an answer with such a cause against an unknown cause for it to be decided. Judgement. A law that
