@@ -35,14 +35,14 @@ class Answered:
         before: coefficients of the nominal model, by name, in the units of the measured campaign.
         after: coefficients with the causes, by the same names; in phase with the motion, like those before, where
             a lag is named.
-        sizes: sizes of the fitted causes in every run, in the units of the similar campaign.
+        sizes: sizes of the fitted causes in every run, in the units of the similar campaign; empty: not known.
     """
 
     campaign: Campaign
     study: Study
     before: Mapping[str, Quantity]
     after: Mapping[str, Quantity]
-    sizes: Sequence[SizeByRun]
+    sizes: Sequence[SizeByRun] = ()
 
 
 @dataclass(frozen=True)
