@@ -123,6 +123,14 @@ class ScatterColumns:
         """
         return self.with_column([t * own[:, place] for t, own in zip(values, self.deviations, strict=True)])
 
+    def share_apart(self) -> float:
+        """Share of the power of the last common column that the other common columns do not explain."""
+        stacked = np.concatenate(self.common)
+        others, last = stacked[:, :-1], stacked[:, -1]
+        size = np.sqrt(np.maximum(np.sum(others**2, axis=0), 1e-300))
+        left = last - others / size @ np.linalg.lstsq(others / size, last, rcond=1e-12)[0]
+        return float(left @ left) / max(float(last @ last), 1e-300)
+
     def likeliest(self, prior: WidthPrior, start: PerKind | None = None) -> Between:
         """The most likely widths, and the runs with them."""
         first = prior.usual if start is None else np.clip(start, prior.least, prior.most)

@@ -27,6 +27,9 @@ OF_GROUPS: Final = 6
 """Minimum number of runs that show two groups. Judgement. The partitions of fewer runs leave no small p-value."""
 CONDITION_RANGE: Final = 0.05
 """Minimum relative range of a condition for the runs to be compared along it. Convention."""
+APART: Final = 1e-4
+"""Minimum share of the power of a pattern that no other common parameter explains, for the pattern to be tested.
+Convention. A spring that is off is the pattern of its runs, and what remains of it is an error of differences."""
 ORDER_CLEARER: Final = 10.0
 """Minimum ratio of the p-values of a condition and of the order of the runs for a difference to be a drift.
 Convention. Strong evidence. Springs are often changed in order, and a cause that follows them is then no drift."""
@@ -208,6 +211,8 @@ def _trend(fitted: Fit, place: int, pattern: Pattern, tried: int) -> Trend | Non
     if count < (IN_ORDER if pattern.along == _ORDER else OF_CONDITION):
         return None
     columns, size = fitted.columns.with_pattern(place, pattern.values)
+    if columns.share_apart() < APART:
+        return None
     prior = width_prior(fitted.problem)
     between = columns.likeliest(prior)
     beside = between.likeliest
