@@ -6,7 +6,6 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +25,7 @@ from diagnosis.search.study import Study
 from tunnel_sim.effects import Effect
 from tunnel_sim.files.from_json import from_json_fields
 from tunnel_sim.files.writing import as_json
+from tunnel_sim.vocabulary.caching import cached_while_in_use
 from tunnel_sim.vocabulary.record import Array
 
 
@@ -111,18 +111,12 @@ class HeldOut:
     points: dict[str, tuple[Array, Array]]
 
 
-#: For fits still in use: the waterfall, the patch and the remainder ask for the same ones.
-_KNOWN: WeakKeyDictionary[Fit, HeldOut] = WeakKeyDictionary()
-
-
+@cached_while_in_use
 def predict_held_out(whole: Fit) -> HeldOut:
-    """Refit without each group of runs, from the fit of all, and predict the group; cached for each fit."""
-    if whole not in _KNOWN:
-        _KNOWN[whole] = _held_out(whole)
-    return _KNOWN[whole]
+    """Refit without each group of runs, from the fit of all, and predict the group.
 
-
-def _held_out(whole: Fit) -> HeldOut:
+    The waterfall, the patch and the remainder ask for the same predictions.
+    """
     data = whole.problem.data
     residuals: dict[str, Array] = {}
     points: dict[str, tuple[Array, Array]] = {}

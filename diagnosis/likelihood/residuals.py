@@ -12,12 +12,12 @@ import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.model.run_data import RunData
+from tunnel_sim.vocabulary.caching import cached_while_in_use
 from tunnel_sim.vocabulary.quantities import Frequencies, Hertz, Seconds
 from tunnel_sim.vocabulary.record import Array
 
@@ -229,15 +229,10 @@ def gap_left(fit: Fit) -> ChannelMisfit:
     )
 
 
-#: The channels of a fit's own residuals are cached, because residuals are split many times.
-_KNOWN_CYCLES: WeakKeyDictionary[Fit, list[_Cycles]] = WeakKeyDictionary()
-
-
+@cached_while_in_use  # residuals are split many times
 def _cycles(fit: Fit) -> list[_Cycles]:
     """The cycles of every run, in which the channels are computed."""
-    if fit not in _KNOWN_CYCLES:
-        _KNOWN_CYCLES[fit] = [_Cycles.of(fit, index) for index in range(len(fit.problem.data.runs))]
-    return _KNOWN_CYCLES[fit]
+    return [_Cycles.of(fit, index) for index in range(len(fit.problem.data.runs))]
 
 
 @dataclass(frozen=True, eq=False)

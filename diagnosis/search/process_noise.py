@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.optimize import minimize
@@ -38,6 +37,7 @@ from diagnosis.search.weights import FittedSet
 from diagnosis.settings import RandomMomentSettings
 from identification.signal.filter import discretised, steady_filters
 from tunnel_sim.effects import Effect
+from tunnel_sim.vocabulary.caching import cached_while_in_use
 from tunnel_sim.vocabulary.record import Array
 
 PART_STDS: Final = 2.0
@@ -133,24 +133,14 @@ class _Channel:
         return self.per_moment * source.moment(self.run, self.data) if source.acts(self.run) else 0.0
 
 
-#: For fits still in use: the tests of a random moment ask for those of the same residuals again.
-_KNOWN: WeakKeyDictionary[Fit, dict[MomentSource, list[ProcessNoise]]] = WeakKeyDictionary()
-
-
+@cached_while_in_use
 def random_moments(fit: Fit, source: MomentSource) -> list[ProcessNoise]:
-    """The random moments of a source that may explain the residuals of a fit; cached for each fit.
+    """The random moments of a source that may explain the residuals of a fit; its tests ask for them again.
 
     Returns:
         The best fit of each form, and of the likeliest with a second part where that pays; empty where it acts in
         no run, or the model is not stable. Two parts of one kind may fit a spectrum that is not of first order.
     """
-    known = _KNOWN.setdefault(fit, {})
-    if source not in known:
-        known[source] = _tried(fit, source)
-    return known[source]
-
-
-def _tried(fit: Fit, source: MomentSource) -> list[ProcessNoise]:
     channels, narrow, chosen = _channels(fit), wandering(fit.problem.data), fit.settings.moment
     if not channels:
         return []

@@ -8,7 +8,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from math import sqrt
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -21,6 +20,7 @@ from identification.signal.decay_fit import Reading, mean_of_blocks, projected_c
 from identification.signal.free_decay import Decay
 from identification.signal.noise import PEAK_HALF_TURN, PeakNoise
 from identification.statistics import inner
+from tunnel_sim.vocabulary.caching import cached_while_in_use
 from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced, read_only, running_integral
 
 Complex = NDArray[np.complex128]
@@ -188,20 +188,12 @@ def starting_decay(record: Record) -> Decay | None:
     return candidates[best] if np.isfinite(costs[best]) else None
 
 
-_FREQUENCIES: WeakKeyDictionary[Record, float | None] = WeakKeyDictionary()
-
-
+@cached_while_in_use
 def starting_frequency(record: Record) -> float | None:
     """The approximate frequency of the strongest oscillation, Hz; None if the record contains no motion.
 
     It is found once for each record: the examination and the methods all begin with it.
     """
-    if record not in _FREQUENCIES:
-        _FREQUENCIES[record] = _find_frequency(record)
-    return _FREQUENCIES[record]
-
-
-def _find_frequency(record: Record) -> float | None:
     if not holds_motion(record):
         return None
     # A block mean hides an oscillation of at most two samples per cycle: a record of some two thousand cycles.
