@@ -48,8 +48,7 @@ class Doubt:
     """A prediction by which a probable answer fails.
 
     Args:
-        kind: ``held out``, ``ahead``, ``patched``, ``under load``, ``left``, ``part``, ``size``, ``still air``,
-            ``pattern`` or ``elsewhere``, as in `Predictions`.
+        kind: a field of `Predictions`, with spaces, such as ``held out``.
         share: the share found, a fraction; None for a doubt about the place.
     """
 
@@ -62,41 +61,80 @@ class Doubt:
         Args:
             one: whether the answer is one effect.
         """
-        return _DOUBTS[self.kind](self.share or 0.0, "s" if one else "")
+        return _REASONS[self.kind.replace(" ", "_")].words(self.share or 0.0, "s" if one else "")
 
 
 def _little(explained: float, s: str) -> str:
     return f"explain{s} only {share(explained)}" if explained > 0.0 else f"explain{s} nothing"
 
 
-_DOUBTS: Mapping[str, Callable[[float, str], str]] = {
-    "held out": lambda found, s: f"{_little(found, s)} of the gap on held-out readings",
-    "ahead": lambda found, s: (
-        f"{_little(found, s)} of the gap in the later half of the runs, fitted to the earlier"
+@dataclass(frozen=True)
+class _Reason:
+    """A reason not to decide on the best-fitting answer.
+
+    Args:
+        fails: whether a prediction fails, from its value and the odds of the answer against an unknown cause.
+        words: predicate of the answer, from the value and the ending of the verb.
+    """
+
+    fails: Callable[[float, float], bool]
+    words: Callable[[float, str], str]
+
+
+def _explains_too_little(explained: float, _: float) -> bool:
+    return explained < PREDICTED_FROM
+
+
+_REASONS: Mapping[str, _Reason] = {
+    "held_out": _Reason(
+        _explains_too_little, lambda found, s: f"{_little(found, s)} of the gap on held-out readings"
     ),
-    "patched": lambda found, s: f"{_little(found, s)} of the gap when written into the model and simulated",
-    "under load": lambda found, s: (
-        f"leave{s} {share(found)} of the gap: friction under load may follow another law"
+    "ahead": _Reason(
+        _explains_too_little,
+        lambda found, s: (
+            f"{_little(found, s)} of the gap in the later half of the runs, fitted to the earlier"
+        ),
     ),
-    "left": lambda found, s: f"leave{s} a residual of {share(found)} of the swing on held-out readings",
-    "part": lambda found, s: (
-        f"explain{s} the gap by cancelling: with a part of the causes the misfit is {significant(found, 2)} times "
-        "the gap"
+    "patched": _Reason(
+        _explains_too_little,
+        lambda found, s: f"{_little(found, s)} of the gap when written into the model and simulated",
     ),
-    "size": lambda found, s: (
-        f"{'differs' if s else 'one of them differs'} by {significant(100.0 * found, 2)} % in size between the "
-        "runs, beyond its errors"
+    "under_load": _Reason(
+        lambda *_: True,
+        lambda found, s: f"leave{s} {share(found)} of the gap: friction under load may follow another law",
     ),
-    "still air": lambda found, s: (
-        f"leave{s} {share(found)} of the gap in the runs in still air, fitted alone"
+    "left": _Reason(
+        lambda found, _: found > LEFT_OF_SWING,
+        lambda found, s: f"leave{s} a residual of {share(found)} of the swing on held-out readings",
     ),
-    "pattern": lambda found, s: (
-        f"leave{s} a difference of {significant(100.0 * found, 2)} % between the runs that follows a condition of "
-        "the plan"
+    "part": _Reason(
+        lambda found, _: found > CANCELS_FROM,
+        lambda found, s: (
+            f"explain{s} the gap by cancelling: with a part of the causes the misfit is {significant(found, 2)} "
+            "times the gap"
+        ),
     ),
-    "elsewhere": lambda *_: "the residuals point elsewhere",
+    "size": _Reason(
+        lambda found, odds: found > SIZE_DIFFERS and odds < SIZE_ODDS,
+        lambda found, s: (
+            f"{'differs' if s else 'one of them differs'} by {significant(100.0 * found, 2)} % in size between the "
+            "runs, beyond its errors"
+        ),
+    ),
+    "still_air": _Reason(
+        lambda found, _: found > STILL_AIR_LEAVES,
+        lambda found, s: f"leave{s} {share(found)} of the gap in the runs in still air, fitted alone",
+    ),
+    "pattern": _Reason(
+        lambda *_: True,
+        lambda found, s: (
+            f"leave{s} a difference of {significant(100.0 * found, 2)} % between the runs that follows a condition "
+            "of the plan"
+        ),
+    ),
+    "elsewhere": _Reason(lambda found, _: bool(found), lambda *_: "the residuals point elsewhere"),
 }
-"""Reasons for not deciding on the best-fitting answer, by kind, from the share found and the ending of the verb."""
+"""Reasons by the field of `Predictions`, the most basic first."""
 
 
 @dataclass(frozen=True)
@@ -133,27 +171,12 @@ class Predictions:
         Args:
             against_unknown: odds of the answer against an unknown cause.
         """
-        shares = {"held out": self.held_out, "ahead": self.ahead, "patched": self.patched}
-        found = [
-            Doubt(kind, explained)
-            for kind, explained in shares.items()
-            if explained is not None and explained < PREDICTED_FROM
-        ]
-        if self.under_load is not None:
-            found.append(Doubt("under load", self.under_load))
-        if self.left is not None and self.left > LEFT_OF_SWING:
-            found.append(Doubt("left", self.left))
-        if self.part is not None and self.part > CANCELS_FROM:
-            found.append(Doubt("part", self.part))
-        if self.size is not None and self.size > SIZE_DIFFERS and against_unknown < SIZE_ODDS:
-            found.append(Doubt("size", self.size))
-        if self.still_air is not None and self.still_air > STILL_AIR_LEAVES:
-            found.append(Doubt("still air", self.still_air))
-        if self.pattern is not None:
-            found.append(Doubt("pattern", self.pattern))
-        if self.elsewhere:
-            found.append(Doubt("elsewhere", None))
-        return tuple(found)
+        known = {name: getattr(self, name) for name in _REASONS}
+        return tuple(
+            Doubt(name.replace("_", " "), None if value is True else value)
+            for name, value in known.items()
+            if value is not None and _REASONS[name].fails(value, against_unknown)
+        )
 
 
 @dataclass(frozen=True)
