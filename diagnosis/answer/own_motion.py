@@ -36,11 +36,17 @@ def with_own_motions(study: Study, measured: Campaign) -> tuple[Disturbance, ...
 
     Args:
         measured: the campaign with all runs, in its own units.
+
+    Returns:
+        Without these numbers where no effect explains the other runs, and where the run holds more than its motion
+        and white noise: a hum, coloured noise, a random moment, or phases and instants of its own.
     """
-    runs = {run.id: run for run in measured.runs}
+    runs, problem = {run.id: run for run in measured.runs}, study.chosen.problem
+    plain = study.prepared.hum is None and study.moment is None and not problem.parameters.of_effects
+    known = study.causes != UNKNOWN and plain and all(run.noise.plain for run in problem.data.runs)
     found = []
     for one in study.disturbed:
-        if one.as_a_whole and one.left_out and study.causes != UNKNOWN:
+        if known and one.as_a_whole and one.left_out:
             campaign = replace(study.campaign, runs=(similar_run(runs[one.run], study.similarity),))
             noise = {one.run: float(np.mean([*study.prepared.noise.variance.values()]))}
             data = prepare(campaign, noise, study.similarity, model=study.model, settings=study.settings)
