@@ -7,7 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from diagnosis.compose import Confirmed, Question, composed
+from diagnosis.compose import Question, composed
+from diagnosis.confirmed import Confirmed
 from diagnosis.diagnosable import Chosen, choose, refuse_undiagnosable, without_short
 from diagnosis.findings.other_motions import refused_limit_cycles
 from diagnosis.findings.repeatability import AnswerWithout, RunRepeatability

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
@@ -15,7 +14,7 @@ from diagnosis.answer.held_out import Waterfall, excess_base
 from diagnosis.answer.linear_theory import coefficient_move, coefficients_of
 from diagnosis.answer.own_motion import with_own_motions
 from diagnosis.answer.runs_in_still_air import left_in_still_air
-from diagnosis.answer.sizes_by_run import SizeByRun, study_sizes
+from diagnosis.confirmed import Confirmed
 from diagnosis.diagnosable import Chosen, gain_words
 from diagnosis.findings.averaged_coefficients import (
     Answers,
@@ -28,7 +27,7 @@ from diagnosis.findings.averaged_coefficients import (
 )
 from diagnosis.findings.candidates import Candidate, candidates, inclusion, parameter_errors
 from diagnosis.findings.cause_sizes import cause_sizes
-from diagnosis.findings.closing import Closing, confirmed
+from diagnosis.findings.closing import Closing
 from diagnosis.findings.closure import GapSummary, NoiseSummary
 from diagnosis.findings.coefficients import Coefficients
 from diagnosis.findings.decision import Decision, Predictions, decision
@@ -41,7 +40,7 @@ from diagnosis.findings.next_run import FurtherRuns, NextRun
 from diagnosis.findings.other_motions import TwoModes, recognised_limit_cycles, second_modes
 from diagnosis.findings.passive import within_bounds
 from diagnosis.findings.remainder import Remainder, remainder
-from diagnosis.findings.repeatability import AnswerWithout, RunRepeatability
+from diagnosis.findings.repeatability import AnswerWithout
 from diagnosis.findings.spring_choices import spring_choices
 from diagnosis.findings.trade_off import least_separated
 from diagnosis.findings.units import (
@@ -101,33 +100,6 @@ class Question:
     remarks: tuple[Remark, ...]
     left_out: Sequence[str]
     say: Progress
-
-
-@dataclass(frozen=True, eq=False)
-class Confirmed:
-    """A study with causes that the held-out readings confirm.
-
-    Args:
-        repeats: repeatability of the runs, in the units of the similar campaign; None for a single run, or a body
-            without a spring.
-    """
-
-    study: Study
-    closes: Closing
-    repeats: RunRepeatability | None
-
-    @cached_property
-    def sizes(self) -> tuple[SizeByRun, ...]:
-        """Sizes of the fitted causes in every run, in the units of the similar campaign."""
-        return study_sizes(self.study)
-
-    @classmethod
-    def of(cls, study: Study) -> Confirmed:
-        """The study without the causes that do not reduce the held-out residual."""
-        study, closes = confirmed(study)
-        # with an unknown cause, the runs may still differ in a way that no effect of the vocabulary describes
-        fitted = study.chosen if study.causes != UNKNOWN else study.between_runs or study.chosen
-        return cls(study, closes, RunRepeatability.find(fitted))
 
 
 @dataclass(frozen=True)

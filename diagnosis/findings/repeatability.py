@@ -11,13 +11,14 @@ import numpy as np
 
 from diagnosis.answer.run_deviations import RunDeviations, RunRepeat, ScatterLimits, Spread
 from diagnosis.findings.finding import Judged, NextStep, Picture
+from diagnosis.findings.run_patterns import sought, trend_words
 from diagnosis.findings.terms import NUMBERS, SCATTERS, scattering, without_scatter
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.search.answer import UNKNOWN
 from diagnosis.search.patterns import Trend, trends
 from identification.show.blocks import TextTable
 from identification.show.drawing import AFTER, BEFORE, INK, NARROW, NOISE, PAPER
-from identification.show.numbers import concise, listed, percent_of, plain, probability, rounded_up, with_std
+from identification.show.numbers import concise, listed, percent_of, plain, probability, rounded_up
 from identification.show.quantity import INTERVAL, Quantity
 from identification.show.style import figure, figure_text, grid, styled
 from identification.status import SYSTEMATIC
@@ -38,17 +39,6 @@ _MEANT = (
     "These are standard deviations between runs, with 90 % intervals; the intervals of the coefficients allow for "
     "them."
 )
-_ALONG = {
-    "spring_stiffness": "stiffness of the spring",
-    "wind_speed": "wind speed",
-    "air_density": "air density",
-    "amplitude": "amplitude",
-}
-_DRIFTS = {
-    "wind_speed": "does the lab warm up, or the fan drift?",
-    "spring_stiffness": "does the spring warm up, or creep?",
-    "mechanical_damping": "does the bearing run in, or the cable creep?",
-}
 
 
 @dataclass(frozen=True)
@@ -228,14 +218,14 @@ class RunRepeatability:
         trend = next((one for one in self.trends if one.effect == effect), None)
         if trend is None or 2.0 * trend.left**2 > width**2:
             return None
-        return NextStep(_sought(trend), "most of the difference between runs follows it")
+        return NextStep(sought(trend), "most of the difference between runs follows it")
 
     @property
     def pattern_steps(self) -> list[NextStep]:
         """The steps where the differences between the runs have a cause that is not named."""
         return [
             NextStep(
-                _sought(one),
+                sought(one),
                 "the runs differ by nothing else" if one.only else "such a difference has a cause",
             )
             for one in self.trends
@@ -313,19 +303,6 @@ class RunRepeatability:
         return (drawn,) if len(self.runs) > 1 else ()
 
 
-def _sought(trend: Trend) -> str:
-    """The search for the cause of a pattern."""
-    if trend.along == "order":
-        course = "from the first run to the last"
-    elif trend.along == "wind":
-        course = "with the wind on"
-    elif trend.along == "groups":
-        course = f"in {listed(list(trend.runs))}"
-    else:
-        course = f"with the {_ALONG[trend.along]}"
-    return f"Look for what makes {NUMBERS[SCATTERS[trend.effect]]} differ {course}"
-
-
 def _stated(spread: Spread) -> str:
     """The scatter stated by the campaign, in its own form, or the statement that none is stated."""
     return f"{100.0 * (spread.stated or 0.0):.4g} %"
@@ -347,33 +324,6 @@ def _differs(spread: Spread, trends: Mapping[str, Trend]) -> str:
         return text
     most = sorted(spread.deviations.items(), key=lambda one: -abs(one[1]))[:2]
     return f"{text}, {' and '.join(f'{run} {percent_of(own, 1, sign=True)}' for run, own in most)} most"
-
-
-def trend_words(trend: Trend) -> str:
-    """The pattern that a quantity follows, in a sentence."""
-    number, drifts = SCATTERS[trend.effect], trend.along == "order"
-    change, rises = with_std(100.0 * abs(trend.change), 100.0 * trend.std), trend.change > 0.0
-    if drifts:
-        goes = "rises" if rises else "falls"
-        differs = f"{NUMBERS[number]} {goes} by {change} % from the first to the last run ({_DRIFTS[number]})"
-    else:
-        differs = f"{NUMBERS[number]} is {change} % {'higher' if rises else 'lower'} {_compared(trend)}"
-    if trend.only:
-        return f"The runs {'drift' if drifts else 'differ'} but do not scatter: {differs}."
-    start = "Part of this is a drift" if drifts else "Part of this is not by chance"
-    return f"{start}: {differs}. The remaining scatter is {percent_of(trend.left)}."
-
-
-def _compared(trend: Trend) -> str:
-    """The runs in which a quantity is higher or lower, and those with which they are compared."""
-    if trend.along == "wind":
-        return "with the wind on than with the wind off"
-    if not trend.runs:
-        return f"at the greatest {_ALONG[trend.along]} than at the least"
-    parted = f"in {listed(list(trend.runs))} than in the other runs"
-    if trend.of_condition:
-        return f"{parted}, which have another {_ALONG[trend.along]}"
-    return f"{parted} (another logger, day or clamping?)"
 
 
 def _ratio(interval: Sequence[float]) -> float:

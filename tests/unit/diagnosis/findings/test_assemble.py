@@ -12,7 +12,8 @@ from scipy.interpolate import CubicSpline
 from diagnosis import _diagnose
 from diagnosis._diagnose import diagnose, vocabulary
 from diagnosis.answer.held_out import excess_base
-from diagnosis.compose import Confirmed, Question, composed
+from diagnosis.compose import Question, composed
+from diagnosis.confirmed import Confirmed
 from diagnosis.diagnosable import Chosen
 from diagnosis.findings.candidates import candidates
 from diagnosis.search.hypothesis import Hypothesis

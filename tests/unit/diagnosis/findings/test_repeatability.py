@@ -10,7 +10,8 @@ import pytest
 from diagnosis.answer.run_deviations import ScatterLimits, Spread
 from diagnosis.findings.cautions import CAUTIONS, sentence_of
 from diagnosis.findings.judgements import zeros_apart
-from diagnosis.findings.repeatability import RunRepeatability, trend_words
+from diagnosis.findings.repeatability import RunRepeatability
+from diagnosis.findings.run_patterns import trend_words
 from diagnosis.findings.units import own_repeatability
 from diagnosis.likelihood.least_squares import fit_at
 from diagnosis.model.parameters import Point

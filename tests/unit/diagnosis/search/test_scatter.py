@@ -12,7 +12,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from diagnosis import diagnose, vocabulary
-from diagnosis.compose import Confirmed
+from diagnosis.confirmed import Confirmed
 from diagnosis.findings.next_run import separation
 from diagnosis.findings.next_steps import next_steps
 from diagnosis.search.clock import StepClock
