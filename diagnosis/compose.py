@@ -41,7 +41,7 @@ from diagnosis.findings.other_motions import TwoModes, recognised_limit_cycles, 
 from diagnosis.findings.passive import within_bounds
 from diagnosis.findings.remainder import Remainder, remainder
 from diagnosis.findings.repeatability import AnswerWithout
-from diagnosis.findings.spring_choices import spring_choices
+from diagnosis.findings.spring_choices import other_inertia, spring_choices
 from diagnosis.findings.trade_off import least_separated
 from diagnosis.findings.units import (
     own_estimates,
@@ -248,6 +248,7 @@ def _beside(study: Study, chosen: Chosen, named: _Named, caveats: tuple[Fact, ..
         nearly=nearly(study),
         immaterial=named.immaterial,
         choices=spring_choices(study),
+        inertia=other_inertia(study),
         hold=other_hold(study),
         rivals=tuple(rival_facts(study.rivals, study.nominal, study.similarity)) if named.unsure else (),
         second_modes=_second_modes(study, chosen) if unknown else (),

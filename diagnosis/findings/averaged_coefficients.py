@@ -27,6 +27,7 @@ from diagnosis.findings.hidden import Hidden, hidden_effects
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.model.similarity import Similarity
 from diagnosis.search.answer import UNKNOWN, Answer
+from diagnosis.search.rivals.rival import explaining
 from diagnosis.search.study import Study
 from diagnosis.settings import AnswerSettings
 from identification.estimate import Estimate
@@ -153,7 +154,8 @@ class Answers:
 def possible_answers(study: Study, kinds: Sequence[type[Effect]]) -> Answers:
     """The answers of a study, without the evenly spread part of their probabilities.
 
-    That part represents causes not considered, not an answer that the runs refute.
+    That part represents causes not considered, not an answer that the runs refute. An unknown cause may be each of
+    the causes from outside the vocabulary that explain the gap, or none of them: it is divided evenly.
 
     Args:
         kinds: the effects that may act unnamed. They are considered beside the chosen answer and every probable
@@ -174,6 +176,10 @@ def possible_answers(study: Study, kinds: Sequence[type[Effect]]) -> Answers:
             others += [Possible(probability * share, fit, answer.textbook_of(fit), small), *alternatives]
     answer = study.answer or Answer((), 1.0, 1.0)
     share, alternatives = _by_choice(answer, chosen, probability_of_answer, kinds)
+    if answer.effects == UNKNOWN:
+        outside = [one.best.fit for one in explaining(study.rivals, study.nominal)]
+        share = 1.0 / (1 + len(outside))
+        alternatives = [Possible(probability_of_answer * share, fit) for fit in outside]
     starts = starts_beside(chosen, kinds)
     small = beside(chosen, starts) if study.causes else None
     hidden = hidden_effects(chosen, starts, None if small is None else small.residuals)

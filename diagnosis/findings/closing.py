@@ -43,6 +43,10 @@ ABSORBED_RATE: Final = 0.001
 have absorbed a cause. Convention. One campaign in 1000 as stated; a wrong spring gives deviations of many
 widths."""
 
+ALIKE_HELD_OUT: Final = 4.0
+"""Maximum difference of χ² on held-out readings between parts of an answer that predict them alike. Convention.
+Two standard deviations of one parameter."""
+
 
 @dataclass(frozen=True)
 class Closing:
@@ -105,7 +109,9 @@ def confirmed(study: Study) -> tuple[Study, Closing]:
 
 
 def _without_needless(study: Study, steps: Waterfall) -> Study | None:
-    """The study with the subset of the fitted causes that predicts held-out readings best.
+    """The study with the part of the fitted causes that predicts held-out readings best, and no worse than all.
+
+    Of parts that differ by chance, it is the likeliest: beside scatter several parts may leave nothing.
 
     Returns:
         None where all of them together predict best, or beside a random moment, which absorbs the causes. A cause
@@ -127,7 +133,14 @@ def _without_needless(study: Study, steps: Waterfall) -> Study | None:
     best = min(filter(None, parts), key=parts.__getitem__, default=whole)
     if best == whole or parts[best] > steps.steps[-1].excess:
         return None
-    return study.of_part(tuple(sorted(best)))
+    near = parts[best] + ALIKE_HELD_OUT / fitted.count
+    alike = [part for part, left in parts.items() if part and part != whole and left <= near]
+
+    def likely(part: frozenset[str]) -> float:
+        weighed = study.of(part)
+        return 0.0 if weighed is None else weighed.probability
+
+    return study.of_part(tuple(sorted(max(alike, key=lambda part: (likely(part), -parts[part])))))
 
 
 @dataclass(frozen=True, eq=False)

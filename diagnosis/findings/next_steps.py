@@ -14,7 +14,7 @@ from diagnosis.findings.next_run import OTHER_INPUT, OTHER_SPEED, NextRun, sourc
 from diagnosis.findings.patch import model_steps
 from diagnosis.findings.place import runs_of_the_gap
 from diagnosis.findings.repeatability import width_text
-from diagnosis.findings.spring_choices import choice_steps
+from diagnosis.findings.spring_choices import choice_steps, inertia_steps
 from diagnosis.findings.terms import CHANNELS, CONDITIONS, SCATTERS, without_scatter
 from diagnosis.findings.whole import Findings
 from diagnosis.search.answer import UNKNOWN
@@ -234,6 +234,7 @@ def _telling_apart(answer: Findings) -> Iterator[NextStep]:
             f"settles which it is{gain}",
         )
     yield from choice_steps(answer.found.choices)
+    yield from inertia_steps(answer.found.inertia)
 
 
 def _deciding(answer: Findings) -> Iterator[NextStep]:

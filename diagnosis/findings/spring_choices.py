@@ -1,11 +1,15 @@
-"""Springs of which one is off where the runs cannot tell which: their errors, in words and steps."""
+"""What else a spring that is off may be, in words and steps: another spring, or another inertia with this spring."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
 
+from scipy.special import chdtri
+
 from diagnosis.findings.finding import NextStep
+from diagnosis.search.rivals.inertia_by_spring import inertia_in_place
+from diagnosis.search.rivals.rival import RIVAL_RATE
 from diagnosis.search.rivals.two_springs import ONE_SPRING, SpringError, spring_error
 from diagnosis.search.study import Study
 from identification.show.numbers import for_people, listed, probability
@@ -64,3 +68,39 @@ def choice_steps(found: Sequence[SpringError]) -> list[NextStep]:
             "shows which of them is off",
         )
     ]
+
+
+def other_inertia(study: Study) -> SpringError | None:
+    """The error of the inertia in the runs of one spring that explains as much as its stiffness; None without one.
+
+    The decay and the air's part in the frequency tell the two apart, where the runs repeat well enough.
+    """
+    fit = study.chosen
+    instead = inertia_in_place(fit)
+    if instead is None:
+        return None
+    fitted, name = instead
+    chance = float(chdtri(1.0, RIVAL_RATE)) * (1.0 + max(fit.excess, 0.0))
+    if fitted.unlikelihood - fit.unlikelihood > chance:
+        return None
+    return spring_error(fitted, name, study.similarity)
+
+
+def inertia_words(found: SpringError | None) -> str:
+    """The inertia that explains as much as another stiffness; empty where the runs exclude it."""
+    if found is None:
+        return ""
+    side = "higher" if found.error > 0.0 else "lower"
+    size = for_people(100.0 * abs(found.error), 100.0 * found.std, "%")
+    return (
+        f"An inertia {size} {side} with the spring of {found.stiffness:g} N m/rad would explain as much: these runs "
+        "do not tell a wrong stiffness from adapters and clamps of another inertia."
+    )
+
+
+def inertia_steps(found: SpringError | None) -> list[NextStep]:
+    """How to tell another stiffness from another inertia; none where the runs tell."""
+    if found is None:
+        return []
+    what = f"Weigh the adapter and the clamps of the spring of {found.stiffness:g} N m/rad"
+    return [NextStep(what, "tells another inertia from a wrong stiffness")]

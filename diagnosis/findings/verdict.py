@@ -10,7 +10,7 @@ from diagnosis.findings.input_hold import hold_words
 from diagnosis.findings.other_motions import second_mode_words
 from diagnosis.findings.patch import model_words
 from diagnosis.findings.place import runs_of_the_gap
-from diagnosis.findings.spring_choices import choice_words
+from diagnosis.findings.spring_choices import choice_words, inertia_words
 from diagnosis.findings.terms import (
     BETWEEN_RUNS,
     CHANNELS,
@@ -76,6 +76,7 @@ def verdict(answer: Findings, rest: str) -> str:
         *(disturbed_words(one, no_gap=not answer.causes) for one in answer.disturbed),
         *_with_second_modes(_answer(answer, rest), answer),
         choice_words(answer.found.choices),
+        inertia_words(answer.found.inertia),
         hold_words(answer.found.hold),
         model_words(answer.model, answer),
         *(str(rival.figures["words"]) for rival in found.rivals),

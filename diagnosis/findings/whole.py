@@ -78,6 +78,7 @@ class Found:
         nearly: effects that nearly explain an unexplained gap; None if there are none.
         immaterial: by coefficient, the relative change by the causes, where they change none materially.
         choices: springs of which one is off; the most likely first.
+        inertia: another inertia that explains as much as the stiffness of a spring; None: none.
         hold: a delay of the input that another hold between samples explains as well; None: none.
         rivals: causes from outside the vocabulary that would explain a gap of unknown cause.
         second_modes: second modes by run, where the gap is not explained.
@@ -95,6 +96,7 @@ class Found:
     nearly: Nearly | None = None
     immaterial: Mapping[str, float] = field(default_factory=dict)
     choices: tuple[SpringError, ...] = ()
+    inertia: SpringError | None = None
     hold: OtherHold | None = None
     rivals: tuple[Fact, ...] = ()
     second_modes: tuple[TwoModes, ...] = ()

@@ -135,6 +135,22 @@ def _words(found: Mapping[str, Any]) -> str:
     )
 
 
+def inertia_in_place(fitted: Fit) -> tuple[Fit, str] | None:
+    """The fit with another inertia in place of another stiffness in the runs of one spring, and its effect's name.
+
+    None where no spring is off, or the fit fails.
+    """
+    problem, kind = fitted.problem, _kind(0)
+    if ONE_SPRING not in problem.effects:
+        return None
+    effects = tuple(kind if one is ONE_SPRING else one for one in problem.effects)
+    fixed = tuple((name.replace(f"{ONE_SPRING.name}.", f"{kind.name}."), value) for name, value in problem.fixed)
+    common = fitted.point.common.copy()
+    common[problem.names.index(f"{ONE_SPRING.name}.error")] *= -1.0  # the same change of the frequency
+    instead = try_fit(replace(problem, effects=effects, fixed=fixed), Point(common, fitted.point.per_run))
+    return None if instead is None else (instead, kind.name)
+
+
 def _with_inertias(base: Hypothesis) -> Hypothesis | None:
     """A set with an inertia of each spring but the softest."""
     problem, point = without_deviations(base.fit)

@@ -84,14 +84,18 @@ class FoundRival:
         return min(self.hypotheses, key=lambda one: one.fit.total)
 
 
-def rival_facts(found: Sequence[FoundRival], nominal: Fit, similarity: Similarity) -> list[Fact]:
-    """The facts of the rivals that explain most of the gap, and nearly as much as the best of them."""
+def explaining(found: Sequence[FoundRival], nominal: Fit) -> list[FoundRival]:
+    """The rivals that explain most of the gap, and nearly as much as the best of them."""
     best = min((one.best.fit for one in found), key=lambda fit: fit.total, default=nominal)
-    explains = [
+    return [
         one
         for one in found
         if one.best.fit.excess <= (1.0 - RIVAL_EXPLAINS) * nominal.excess
         and one.best.fit.total - best.total <= RIVAL_NEAR * (1.0 + max(best.excess, 0.0))
     ]
-    facts = (one.rival.fact(one.best, similarity) for one in explains)
+
+
+def rival_facts(found: Sequence[FoundRival], nominal: Fit, similarity: Similarity) -> list[Fact]:
+    """The facts of the rivals that explain the gap."""
+    facts = (one.rival.fact(one.best, similarity) for one in explaining(found, nominal))
     return [fact for fact in facts if fact is not None]

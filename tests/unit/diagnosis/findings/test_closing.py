@@ -92,6 +92,25 @@ def test_a_cause_that_does_not_reduce_the_held_out_residual_is_not_part_of_the_a
     assert found.gap.excess_after == 0.09
 
 
+def test_of_two_parts_that_predict_alike_the_likelier_is_the_answer(both, monkeypatch):
+    """Beside scatter every part may leave nothing, and its held-out residuals then differ by chance."""
+    left = {CAUSE: 0.09, IDLE: 0.09 - 1.0 / both.chosen.count}
+
+    def waterfall(study, base):
+        del base
+        if study.fitted == (IDLE, CAUSE):
+            steps = Step(None, 30.0), Step(CAUSE, left[CAUSE]), Step(IDLE, 0.1)
+            return Waterfall(steps, {CAUSE: left[IDLE], IDLE: left[CAUSE]})
+        return Waterfall((Step(None, 30.0), *(Step(name, left[name]) for name in study.fitted)), {})
+
+    monkeypatch.setattr("diagnosis.findings.closing.waterfall", waterfall)
+    other = answer((IDLE,), 0.0, 0.02)
+    assert confirmed(replace(both, answers=(*both.answers, other)))[0].causes == (CAUSE,)
+    left[IDLE] = 0.09 - 100.0 / both.chosen.count  # beyond chance
+    fitted = answer((IDLE,), 0.0, 0.02, added(both.nominal, IDLE))
+    assert confirmed(replace(both, answers=(*both.answers, fitted)))[0].fitted != (CAUSE,)
+
+
 def test_a_cause_that_reduces_it_stays(both, monkeypatch):
     held_out(monkeypatch, 0.11)
     study, found = confirmed(both)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from diagnosis.search.rivals.inertia_by_spring import InertiaBySpring
 from diagnosis.search.rivals.two_springs import TwoSprings
 from tests.support.gap_campaigns import CN_BETA, CN_R, DAMPING, INERTIA, NOISE, nominal
 from tunnel_sim.effects import effect_class
+from tunnel_sim.vocabulary.between_runs import Repeatability
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
 
@@ -66,6 +68,19 @@ def test_a_spring_that_is_not_as_stiff_as_stated_keeps_its_name() -> None:
     wrong = decays(dict.fromkeys(BY_SPRING, 0.0), {28.3: 0.005})
     found = diagnose(wrong, kinds=KINDS[::2], rivals=(InertiaBySpring(),))
     assert tuple(found.causes) == ("spring_miscalibration",)
+    assert found.found.inertia is None  # the decays tell
+
+
+def test_runs_that_scatter_do_not_tell_a_wrong_spring_from_another_inertia() -> None:
+    """Of 0.5 % the decays and the air's part in the frequency show nothing beside a damping that scatters by 1 %."""
+    stated = Repeatability(wind_speed=3e-3, spring_stiffness=2e-4, mechanical_damping=1e-2)
+    adapter = replace(decays(BY_SPRING | {28.3: 0.005, 44.84: 0.0}, scatter=2e-4), repeatability=stated)
+    found = diagnose(adapter, kinds=[effect_class("spring_miscalibration")])
+    assert tuple(found.causes) == ("spring_miscalibration",)
+    assert found.found.inertia.stiffness == pytest.approx(28.3)
+    assert found.found.inertia.error == pytest.approx(0.005, abs=1e-3)
+    assert "with the spring of 28.3 N m/rad would explain as much" in found.verdict
+    assert any(step.startswith("Weigh the adapter and the clamps") for step in next_steps(found))
 
 
 def test_the_inertias_take_up_no_part_of_the_scatter_between_runs() -> None:
