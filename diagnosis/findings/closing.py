@@ -140,7 +140,8 @@ def _without_needless(study: Study, steps: Waterfall) -> Study | None:
         weighed = study.of(part)
         return 0.0 if weighed is None else weighed.probability
 
-    return study.of_part(tuple(sorted(max(alike, key=lambda part: (likely(part), -parts[part])))))
+    likeliest = max(alike, key=lambda part: (likely(part), -parts[part]))
+    return study.of_part(tuple(sorted(likeliest)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""What else a spring that is off may be, in words and steps: another spring, or another inertia with this spring."""
+"""What else a wrong spring may be, in words and steps: another spring, or another inertia with this spring."""
 
 from __future__ import annotations
 
@@ -93,8 +93,8 @@ def inertia_words(found: SpringError | None) -> str:
     side = "higher" if found.error > 0.0 else "lower"
     size = for_people(100.0 * abs(found.error), 100.0 * found.std, "%")
     return (
-        f"An inertia {size} {side} with the spring of {found.stiffness:g} N m/rad would explain as much: these runs "
-        "do not tell a wrong stiffness from adapters and clamps of another inertia."
+        f"An inertia {size} {side} with the spring of {found.stiffness:g} N m/rad would explain as much: these "
+        "runs do not tell a wrong stiffness from adapters and clamps of another inertia."
     )
 
 

@@ -144,7 +144,9 @@ def inertia_in_place(fitted: Fit) -> tuple[Fit, str] | None:
     if ONE_SPRING not in problem.effects:
         return None
     effects = tuple(kind if one is ONE_SPRING else one for one in problem.effects)
-    fixed = tuple((name.replace(f"{ONE_SPRING.name}.", f"{kind.name}."), value) for name, value in problem.fixed)
+    fixed = tuple(
+        (name.replace(f"{ONE_SPRING.name}.", f"{kind.name}."), value) for name, value in problem.fixed
+    )
     common = fitted.point.common.copy()
     common[problem.names.index(f"{ONE_SPRING.name}.error")] *= -1.0  # the same change of the frequency
     instead = try_fit(replace(problem, effects=effects, fixed=fixed), Point(common, fitted.point.per_run))

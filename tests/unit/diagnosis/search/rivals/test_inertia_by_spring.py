@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from diagnosis import diagnose
+from diagnosis.findings.averaged_coefficients import possible_answers
 from diagnosis.findings.next_steps import next_steps
 from diagnosis.search.answer import UNKNOWN
+from diagnosis.search.investigate import investigate
 from diagnosis.search.rivals.inertia_by_spring import InertiaBySpring
 from diagnosis.search.rivals.two_springs import TwoSprings
 from tests.support.gap_campaigns import CN_BETA, CN_R, DAMPING, INERTIA, NOISE, nominal
@@ -59,6 +61,16 @@ def test_an_inertia_that_differs_by_spring_is_unknown_and_said_with_its_size() -
     )
 
 
+def test_the_coefficients_of_an_unknown_cause_are_averaged_over_what_may_be_it() -> None:
+    study = investigate(decays(BY_SPRING), KINDS[::2], rivals=(InertiaBySpring(),))
+    assert study.fitted == UNKNOWN
+    plain, rival, *_ = possible_answers(study, ()).possible
+    assert plain.fit is study.nominal
+    assert rival.probability == pytest.approx(plain.probability)
+    assert rival.fit.value("cn_beta") == pytest.approx(CN_BETA, abs=3.0 * rival.fit.std("cn_beta"))
+    assert abs(plain.fit.value("cn_beta") - CN_BETA) > 10.0 * plain.fit.std("cn_beta")
+
+
 @pytest.mark.slow
 def test_without_the_rival_it_takes_a_false_name() -> None:
     assert tuple(diagnose(decays(BY_SPRING), kinds=KINDS, rivals=()).causes) != UNKNOWN
@@ -72,7 +84,7 @@ def test_a_spring_that_is_not_as_stiff_as_stated_keeps_its_name() -> None:
 
 
 def test_runs_that_scatter_do_not_tell_a_wrong_spring_from_another_inertia() -> None:
-    """Of 0.5 % the decays and the air's part in the frequency show nothing beside a damping that scatters by 1 %."""
+    """Beside a damping that scatters by 1 %, the decays and the air's part in the frequency do not show 0.5 %."""
     stated = Repeatability(wind_speed=3e-3, spring_stiffness=2e-4, mechanical_damping=1e-2)
     adapter = replace(decays(BY_SPRING | {28.3: 0.005, 44.84: 0.0}, scatter=2e-4), repeatability=stated)
     found = diagnose(adapter, kinds=[effect_class("spring_miscalibration")])
