@@ -26,7 +26,7 @@ from tunnel_sim.vocabulary.record import Array
 
 NEEDLESS_SPRING: Final = 0.05
 """Maximum stiffness of an unstated spring, as a share of its stiffness with gravity, for the rig to have no
-spring. Judgement (decision 0018). The set then counts two parameters less: otherwise the spring would have to
+spring. Judgement (decision 0007). The set then counts two parameters less: otherwise the spring would have to
 soften by chance exactly as much as gravity does."""
 
 FORM_NEEDED: Final = 0.2

@@ -127,7 +127,7 @@ class SearchSettings:
         "Time. Of five campaigns with up to 80,000 readings, one was answered sooner that way, and one "
         "later.",
         unit="block means",
-        decision="0018",
+        decision="0007",
     )
     begun_on: int = setting(
         15_000,
@@ -135,7 +135,7 @@ class SearchSettings:
         "tuned",
         "Time against coverage, on Silverbox and on sealed campaigns.",
         unit="block means",
-        decision="0018",
+        decision="0007",
     )
 
 
@@ -194,7 +194,7 @@ class WeighingSettings:
         "Exponent of the evidence for scatter between runs.",
         "convention",
         "A likelihood.",
-        decision="0036",
+        decision="0007",
     )
     needless_scatter: float = setting(
         4.0,
@@ -204,7 +204,7 @@ class WeighingSettings:
         "between runs, the best of all effects lowered −2 ln of the evidence by more than 10 in two (11.9 "
         "and 13.7), by 8.9 and 6.4 in two, and by 3.1 at most in the others: two or three in 100 exceed 10.",
         unit="χ²",
-        decision="0036",
+        decision="0007",
     )
     set_price: float = setting(
         3.0,

@@ -28,7 +28,7 @@ from tunnel_sim.effects.capabilities import Clock
 
 COMPARED_FROM: Final = 0.01
 """Minimum probability of a set of the beginnings of driven runs for comparison in whole runs. Judgement
-(decision 0018). Time against coverage."""
+(decision 0007). Time against coverage."""
 
 _LEAST = 8  # cycles in a beginning: a body with a damping ratio of 0.02 remembers as many
 

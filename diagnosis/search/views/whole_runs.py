@@ -47,11 +47,11 @@ simulated campaigns of three and four causes, free forms did not improve sets wi
 to 0.81."""
 GROWN_BESIDE: Final = 0.2
 """Maximum unexplained share of the gap within runs for a set beside scatter to be extended, where no set
-explains the runs. Judgement (decision 0036). In two unblinded campaigns of two and three causes, the first
+explains the runs. Judgement (decision 0007). In two unblinded campaigns of two and three causes, the first
 cause left 0.02 and 0.09. Time against coverage."""
 BESIDE_SCATTER: Final = 4
 """Number of sets, found for runs that repeat, that are compared after scatter between runs is added. Judgement
-(decision 0036). Time against coverage."""
+(decision 0007). Time against coverage."""
 
 
 @dataclass(frozen=True, eq=False)
