@@ -1,7 +1,7 @@
 """Patterns in the differences between runs: their order, a condition of the plan, or two groups of runs.
 
 A difference that follows a pattern has a cause, so it is not scatter
-(docs/decisions/0036-runs-that-do-not-repeat.md).
+(docs/decisions/0036-the-model-of-a-campaign.md).
 """
 
 from __future__ import annotations

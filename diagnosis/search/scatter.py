@@ -2,7 +2,7 @@
 
 A wind speed, a spring or a damping that differs slightly from run to run is not a cause among others. Beside
 any set of causes every run has deviations. Their prior is normal, with the most likely width for the set. They
-are integrated out where sets are compared (docs/decisions/0036-runs-that-do-not-repeat.md).
+are integrated out where sets are compared (docs/decisions/0036-the-model-of-a-campaign.md).
 """
 
 from __future__ import annotations
