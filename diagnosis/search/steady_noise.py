@@ -27,6 +27,9 @@ first-order. With the true sets of unblinded campaigns it is at most 9.0."""
 BURST_POWER: Final = 1.5
 """Maximum power of short innovations of a steady moment, relative to chance. Judgement. Real turbulence is
 not exactly stationary."""
+BURST_SHARE: Final = 0.02
+"""Minimum share of the power of all innovations for a burst to count against a moment. Judgement. Most of a blow is
+in one burst; a jump of a few lost samples beside turbulence has half a per cent."""
 FADING: Final = 1.5
 """Ratio of the intensity in the first third of the runs to the intensity in the last third, above which a moment
 fades with the motion. Judgement. The rest of a motion that a model misses decays with it; the surroundings and the
@@ -68,7 +71,7 @@ def is_steady_noise(result: ProcessNoise, chosen: RandomMomentSettings) -> bool:
         return False
     return (
         departure_from_white(result) <= WHITE_INNOVATIONS
-        and bursts(result, chosen.burst_rate) <= BURST_POWER
+        and bursts(result, chosen.burst_rate, BURST_SHARE) <= BURST_POWER
         and of_all_runs(result) >= chosen.one_run_rate
     )
 
@@ -90,7 +93,7 @@ def departure_from_white(result: ProcessNoise) -> float:
     return float(np.max(np.abs(departures)))
 
 
-def bursts(result: ProcessNoise, false_alarm_rate: float) -> float:
+def bursts(result: ProcessNoise, false_alarm_rate: float, least: float = 0.0) -> float:
     """Greatest power of innovations within a short time, relative to the greatest by chance.
 
     A blow is in few innovations, a gust in some more. Windows of 1, 2, 4, … innovations are moved over each run,
@@ -98,15 +101,17 @@ def bursts(result: ProcessNoise, false_alarm_rate: float) -> float:
 
     Args:
         false_alarm_rate: greatest probability that a steady normal moment exceeds 1 in any window, a fraction.
+        least: share of the power of all innovations below which a burst does not count.
     """
     lengths = [1 << k for k in range(20)]
     windows = [(i, n) for i in result.innovations for n in lengths if 4 * n <= i.size]
     rate = false_alarm_rate / max(sum(i.size - n + 1 for i, n in windows), 1)
+    least *= sum(float(i @ i) for i in result.innovations)
     highest = 0.0
     for innovations, length in windows:
         total = np.concatenate(([0.0], np.cumsum(innovations**2)))
-        power = float(np.max(total[length:] - total[:-length]))
-        highest = max(highest, power / float(chdtri(length, rate)))
+        power, limit = float(np.max(total[length:] - total[:-length])), float(chdtri(length, rate))
+        highest = max(highest, power / limit if power - limit >= least else 0.0)
     return highest
 
 

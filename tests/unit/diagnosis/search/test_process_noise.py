@@ -19,7 +19,13 @@ from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.process_noise import MomentLayer, with_response
 from diagnosis.search.random_moments import excess_elsewhere, is_no_noise, obeys_a_law, weigh_random_moments
 from diagnosis.search.random_spectra import BROAD, CENTRED, STREAM, SpectrumPart, wandering
-from diagnosis.search.steady_noise import bursts, departure_from_white, is_steady_noise, of_all_runs
+from diagnosis.search.steady_noise import (
+    BURST_SHARE,
+    bursts,
+    departure_from_white,
+    is_steady_noise,
+    of_all_runs,
+)
 from diagnosis.search.weights import FittedSet
 from diagnosis.settings import Settings
 from tests.marks import slow
@@ -140,6 +146,18 @@ def test_a_blow_in_steady_turbulence_is_a_burst(found, length):
     struck = [i.copy() for i in found.innovations]
     struck[0][100 : 100 + length] += 8.0 / length**0.25  # standard deviations
     assert bursts(replace(found, innovations=struck), 0.001) > 1.5
+
+
+def test_a_jump_that_is_a_small_part_of_a_moment_is_no_burst(found):
+    """Such as lost samples beside turbulence; a blow is a large part of the moment that is taken for it."""
+    rng = np.random.default_rng(12)
+    drawn = [rng.standard_normal(2000) for _ in range(3)]
+    assert bursts(replace(found, innovations=drawn), 0.001, BURST_SHARE) < 1.0
+    for size, counts in ((10.0, False), (25.0, True)):
+        struck = [drawn[0].copy(), *drawn[1:]]
+        struck[0][100] += size
+        assert bursts(replace(found, innovations=struck), 0.001) > 1.5
+        assert (bursts(replace(found, innovations=struck), 0.001, BURST_SHARE) > 1.5) is counts
 
 
 def test_steady_innovations_burst_at_the_stated_rate_at_most(found):
