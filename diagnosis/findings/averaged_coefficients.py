@@ -341,10 +341,13 @@ def in_phase(fit: Fit) -> tuple[dict[str, Quantity], tuple[tuple[float, ...], ..
     if np.array_equal(here[:2], here[2:]):
         return {}, ()
     covariance, slopes = fit.stated_covariance, []
+    ends = np.array(fit.problem.bounds)
     for place, std in enumerate(np.sqrt(np.maximum(np.diag(covariance), 0.0))):
-        step = np.zeros_like(fit.point.common)
-        step[place] = _STEP * (std or 1.0)
-        slopes.append((both(fit.point.common + step) - both(fit.point.common - step)) / (2.0 * step[place]))
+        low, high = fit.point.common.copy(), fit.point.common.copy()
+        # an undetermined parameter has a deviation far beyond its range
+        reach = np.clip(fit.point.common[place] + _STEP * (std or 1.0) * np.array([-1.0, 1.0]), *ends[:, place])
+        low[place], high[place] = reach
+        slopes.append((both(high) - both(low)) / (high[place] - low[place]))
     jacobian = np.array(slopes).T
     matrix = jacobian @ covariance @ jacobian.T
     for effect in fit.problem.effects_at(fit.point.common):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagnosis.findings.averaged_coefficients import in_phase
-from diagnosis.likelihood.least_squares import fit
+from diagnosis.likelihood.least_squares import fit, fit_at
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
 from tests.support.diagnosis_document import document, findings_of
@@ -32,6 +32,18 @@ def test_the_sum_is_determined_far_better_than_its_parts(lag):
     assert np.all(np.linalg.eigvalsh(matrix) > -1e-15)
     assert np.array_equal(matrix, matrix.T) or np.allclose(matrix, matrix.T, rtol=1e-9)
     assert (estimates["cn_beta"].value < found.value("cn_beta")) == (lag > 0.0)
+
+
+def test_beside_a_form_that_the_runs_do_not_show_nothing_is_tried_beyond_its_range():
+    """A tiny hysteresis leaves its roundness undetermined, with a deviation of thousands."""
+    hysteresis = effect_class("sensor_hysteresis")
+    base = nominal(campaign(effect_from(LAG.name, {"lag": 0.3})))
+    own, form = [0.3, 1e-9, 0.99], (f"{hysteresis.name}.roundness",)
+    problem = Problem(base.problem.data, (LAG, hysteresis), free_forms=form)
+    found = fit_at(problem, Point(np.append(base.point.common, own), base.point.per_run))
+    assert found.std(form[0]) > 1e4
+    estimates, _ = in_phase(found)
+    assert np.isfinite(estimates["cn_r"].std)
 
 
 def test_without_a_lag_there_is_one_cn_r():
