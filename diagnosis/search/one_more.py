@@ -32,7 +32,8 @@ LEAST_DROP: Final = 20.0
 by more than 20 by chance once in 22,000 effects tried."""
 LIKELY_BESIDE_SCATTER: Final = 6
 """Number of effects that are fitted in any case where scatter between runs explains their deviations.
-Judgement. Linear theory underestimates effects hidden by deviations of the runs. Time against coverage."""
+Judgement. Linear theory underestimates effects hidden by deviations of the runs: an offset of the wind beside
+free play was not tried. Time against coverage."""
 GROWN_BY: Final = 4
 """Number of effects that are added to a set. Judgement. Time against coverage."""
 SAME_CHANGE: Final = 0.02
@@ -103,7 +104,8 @@ def _worth_fitting(
     """The effects that explain most by linear theory; generously many after the nominal model.
 
     Beside other effects, an effect is left out if its predicted gain is chance. Where chance differences
-    between the runs explain the effects, those with the greatest predicted likelihood are fitted.
+    between the runs explain what remains, those with the greatest predicted gain are fitted: the differences absorb
+    most of what linear theory predicts.
     """
     scored = [(kind, starts) for kind in kinds if (starts := starting_points(parent.fit, kind))]
     weighing = parent.fit.settings.weighing
@@ -118,7 +120,7 @@ def _worth_fitting(
         own, beyond = own_gain(parent.fit.problem), {}
         for kind, starts in scored:  # the chance gain of the effect's parameters per run is excluded
             beyond[kind.name] = starts[0].predicted_drop - (own_gain(starts[0].problem) - own)
-        if not parent.effects:
+        if parent.explains_runs and parent.fit.problem.scatter:
             likely = sorted(scored, key=lambda item: -beyond[item[0].name])[:LIKELY_BESIDE_SCATTER]
             return [item for item in likely if beyond[item[0].name] > 0.0]
         worth = [item for item in scored[:GROWN_BY] if beyond[item[0].name] > LEAST_DROP]
