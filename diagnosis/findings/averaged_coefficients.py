@@ -345,7 +345,9 @@ def in_phase(fit: Fit) -> tuple[dict[str, Quantity], tuple[tuple[float, ...], ..
     for place, std in enumerate(np.sqrt(np.maximum(np.diag(covariance), 0.0))):
         low, high = fit.point.common.copy(), fit.point.common.copy()
         # an undetermined parameter has a deviation far beyond its range
-        reach = np.clip(fit.point.common[place] + _STEP * (std or 1.0) * np.array([-1.0, 1.0]), *ends[:, place])
+        reach = np.clip(
+            fit.point.common[place] + _STEP * (std or 1.0) * np.array([-1.0, 1.0]), *ends[:, place]
+        )
         low[place], high[place] = reach
         slopes.append((both(high) - both(low)) / (high[place] - low[place]))
     jacobian = np.array(slopes).T

@@ -148,6 +148,20 @@ def test_a_lead_is_tried_beside_another_effect_though_linear_theory_predicts_lit
     assert abs(child.fit.value("unsteady_aero_lag.lag") + 0.3) < 3.0 * child.fit.std("unsteady_aero_lag.lag")
 
 
+def test_an_offset_of_the_wind_is_tried_beside_another_effect_though_linear_theory_predicts_little(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The deviations of the wind speed absorb most of it."""
+    _, base = beside_scatter(blown(offset=0.5, sensor_error=-0.07), "sensor_nonlinearity")
+    offset = effect_class("wind_speed_offset")
+    (start,) = starting_points(base, offset)
+    assert start.predicted_drop < LEAST_DROP
+    assert sets_with_one_more([Hypothesis(("sensor_nonlinearity",), base)], [offset]) == []
+    monkeypatch.setattr(Hypothesis, "explains_runs", True)
+    (child,) = sets_with_one_more([Hypothesis(("sensor_nonlinearity",), base)], [offset])
+    assert child.names == ("sensor_nonlinearity", "wind_speed_offset")
+
+
 def test_a_fit_worse_than_without_the_effect_starts_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """From a lag the fit ends in wide deviations, beside which the lead remains invisible."""
     base = scattered(nominal_study(blown(lead=0.45), known_effects()).prepared.nominal, known_effects())
