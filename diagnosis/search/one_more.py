@@ -120,14 +120,15 @@ def _worth_fitting(
         own, beyond = own_gain(parent.fit.problem), {}
         for kind, starts in scored:  # the chance gain of the effect's parameters per run is excluded
             beyond[kind.name] = starts[0].predicted_drop - (own_gain(starts[0].problem) - own)
-        worth = [item for item in scored[:GROWN_BY] if beyond[item[0].name] > LEAST_DROP]
-        absorbed = [item for item in scored if parent.explains_runs and item[1][0].second_order]
-        # linear theory underestimates these effects: the runs' deviations absorb most of the prediction, not
-        # of the effect
+        # linear theory underestimates effects beside scatter: the runs' deviations absorb most of the prediction,
+        # not of the effect
         if parent.explains_runs and parent.fit.problem.scatter:
             worth = sorted(scored, key=lambda item: -beyond[item[0].name])[:LIKELY_BESIDE_SCATTER]
-        further = [item for item in absorbed if item not in worth and parent.effects]
-        return [item for item in (*worth, *further) if beyond[item[0].name] > 0.0]
+        else:
+            worth = [item for item in scored[:GROWN_BY] if beyond[item[0].name] > LEAST_DROP]
+        if parent.effects and parent.explains_runs:
+            worth += [item for item in scored if item[1][0].second_order and item not in worth]
+        return [item for item in worth if beyond[item[0].name] > 0.0]
     limit = PREDICTED_SHARE * parent.fit.total
     return [item for i, item in enumerate(scored) if i < ALWAYS_FITTED or item[1][0].predicted_drop > limit]
 
