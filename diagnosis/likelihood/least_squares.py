@@ -12,7 +12,7 @@ import numpy as np
 
 from diagnosis.likelihood.normal_equations import Products, damped_step, normal_equations
 from diagnosis.likelihood.problem import Problem
-from diagnosis.likelihood.scatter_widths import Between, Kept, ScatterColumns, width_prior
+from diagnosis.likelihood.scatter_widths import Between, Kept, ScatterColumns
 from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.model.parameters import Point
 from diagnosis.settings import Settings
@@ -99,7 +99,7 @@ class Fit:
         """The likeliest widths of chance differences between the runs; None in a fit without any."""
         if not self.problem.scatter:
             return None
-        return self.columns.likeliest(width_prior(self.problem), self.widths)
+        return self.columns.likeliest(self.widths)
 
     def scatter_cost(self, deviation_precision: Array) -> float:
         """−2 ln of the evidence of the chance differences between the runs, without χ²; 0 if the runs repeat.
@@ -139,7 +139,7 @@ class Fit:
         """
         if not self.problem.scatter:
             return self.total
-        here = self.columns.at(self.widths, width_prior(self.problem))
+        here = self.columns.at(self.widths)
         return self.total + here.likeliest.log_determinant + here.prior_cost
 
     @property

@@ -7,7 +7,7 @@ are integrated out (`identification.campaign.random_effects`).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
 
@@ -59,12 +59,16 @@ class ScatterColumns:
         deviations: columns of the deviations, by run, shape (n, kinds).
         common: columns of the common parameters, by run, shape (n, common).
         residuals: scaled, without the fitted deviations, by run, shape (n,).
+        prior: of the widths of the deviations.
     """
 
     bases: list[Array]
     deviations: list[Array]
     common: list[Array]
     residuals: list[Array]
+    prior: WidthPrior
+    # the tests of one fit compare the same widths again and again; every comparison is a search
+    _compared: dict[bytes, Between] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def of(
@@ -87,12 +91,17 @@ class ScatterColumns:
             seen.append(_without(basis, residual + chance @ values[places]))
         inside = [_inside(deviations, column) for column in _columns(common)]
         common = [np.stack(parts, axis=1) for parts in zip(*inside, strict=True)] if inside else common
-        return cls(bases, deviations, common, seen)
+        return cls(bases, deviations, common, seen, width_prior(problem))
 
     @cached_property
     def products(self) -> RunProducts:
         """Products of the columns."""
         return RunProducts.of(self.deviations, self.common, self.residuals)
+
+    @cached_property
+    def within_runs(self) -> Marginal:
+        """The runs with the greatest widths, so that only the evidence within runs counts."""
+        return marginal(self.products, self.prior.most)
 
     def with_column(self, change: Sequence[Array]) -> tuple[ScatterColumns, float]:
         """Add a common column; also returns the norm by which it is scaled.
@@ -104,7 +113,7 @@ class ScatterColumns:
         column = _inside(self.deviations, column)
         size = float(np.sqrt(sum(float(one @ one) for one in column))) or 1.0
         common = [np.column_stack([c, one / size]) for c, one in zip(self.common, column, strict=True)]
-        return ScatterColumns(self.bases, self.deviations, common, self.residuals), size
+        return ScatterColumns(self.bases, self.deviations, common, self.residuals, self.prior), size
 
     def remaining_residuals(self, found: Marginal) -> list[Array]:
         """Residuals at the most likely parameters and deviations by linear theory, by run, shape (n,)."""
@@ -131,38 +140,44 @@ class ScatterColumns:
         left = last - others / size @ np.linalg.lstsq(others / size, last, rcond=1e-12)[0]
         return float(left @ left) / max(float(last @ last), 1e-300)
 
-    def likeliest(self, prior: WidthPrior, start: PerKind | None = None) -> Between:
-        """The most likely widths, and the runs with them."""
-        first = prior.usual if start is None else np.clip(start, prior.least, prior.most)
-        # a further parameter may act like a width: then there are several maxima
-        narrower = (first, np.maximum(_NARROWER * first, prior.least), prior.least)
-        tries = np.array(list(product(*zip(*narrower, strict=True))))
-        starts = {0, int(np.argmin(restricted_costs(self.products, prior, tries)))}
-        ends = (likeliest_widths(self.products, prior, tries[one]) for one in sorted(starts))
-        return min((self.at(widths, prior) for widths in ends), key=lambda one: one.restricted)
+    def likeliest(self, start: PerKind | None = None, *, only: Kept | None = None) -> Between:
+        """The most likely widths, and the runs with them.
 
-    def gain(self, prior: WidthPrior, kept: Kept, lost: Kept) -> float:
+        Args:
+            start: start of the search, shape (kinds,); None: the usual widths.
+            only: the differences whose widths are free, shape (kinds,); the others keep their least widths.
+                None: all are free.
+        """
+        prior = self.prior if only is None else _at_least(self.prior, ~only)
+        first = prior.usual if start is None else np.clip(start, prior.least, prior.most)
+        key = np.concatenate([prior.decades, first]).tobytes()
+        if key not in self._compared:
+            # a further parameter may act like a width: then there are several maxima
+            narrower = (first, np.maximum(_NARROWER * first, prior.least), prior.least)
+            tries = np.array(list(product(*zip(*narrower, strict=True))))
+            starts = {0, int(np.argmin(restricted_costs(self.products, prior, tries)))}
+            ends = [likeliest_widths(self.products, prior, tries[one]) for one in sorted(starts)]
+            self._compared[key] = min(map(self.at, ends), key=lambda one: one.restricted)
+        return self._compared[key]
+
+    def gain(self, kept: Kept, lost: Kept) -> float:
         """Drop of −2 ln L by some of the differences beside the remaining ones, dimensionless.
 
         Args:
             kept: all differences compared, shape (kinds,); the others keep their least widths.
             lost: differences among them that the likelihood is compared without, shape (kinds,).
         """
-        whole = self.likeliest(_at_least(prior, ~kept))
-        without = self.likeliest(_at_least(prior, ~kept | lost))
-        return without.likeliest.restricted - whole.likeliest.restricted
+        without = self.likeliest(only=kept & ~lost)
+        return without.likeliest.restricted - self.likeliest(only=kept).likeliest.restricted
 
-    def wider(self, prior: WidthPrior, widths: PerKind) -> float:
+    def wider(self, widths: PerKind) -> float:
         """P-value of the observed differences if the given widths are true, by the likelihood ratio."""
-        gain = (
-            self.at(widths, prior).likeliest.restricted - self.likeliest(prior, widths).likeliest.restricted
-        )
+        gain = self.at(widths).likeliest.restricted - self.likeliest(widths).likeliest.restricted
         return float(chdtrc(float(widths.size), max(gain, 0.0)))
 
-    def at(self, widths: PerKind, prior: WidthPrior) -> Between:
+    def at(self, widths: PerKind) -> Between:
         """The runs with given widths."""
-        most = marginal(self.products, prior.most)
-        return Between(widths, marginal(self.products, widths), prior.cost(widths), most)
+        return Between(widths, marginal(self.products, widths), self.prior.cost(widths), self.within_runs)
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ from diagnosis.likelihood.normal_equations import Products, damped_step, normal_
 from diagnosis.likelihood.per_run import ResidualsOf
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import CHANNELS, gap_left, misfit
-from diagnosis.likelihood.scatter_widths import Between, width_prior
+from diagnosis.likelihood.scatter_widths import Between
 from diagnosis.model.chance import Scatter
 from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
@@ -242,7 +242,7 @@ def _added_beside_scatter(base: Fit, between: Between, change: list[Array]) -> _
     if not all(np.all(np.isfinite(one)) for one in change):
         return None
     columns, size = base.columns.with_column(change)
-    beside = columns.likeliest(width_prior(base.problem), between.widths)
+    beside = columns.likeliest(between.widths)
     return _Added(
         float(beside.likeliest.common[-1]) / size,
         between.likelihood - beside.likelihood,

@@ -14,7 +14,6 @@ from diagnosis.likelihood.least_squares import Fit, FitError, try_fit
 from diagnosis.likelihood.least_squares import fit as refit
 from diagnosis.likelihood.per_run import excited, ringing, ringing_p_value
 from diagnosis.likelihood.problem import Problem
-from diagnosis.likelihood.scatter_widths import width_prior
 from diagnosis.likelihood.starting_points import misses_motion, nominal_start, starting_points
 from diagnosis.model.fact import Fact, Noted
 from diagnosis.noise.bands import p_values
@@ -131,7 +130,7 @@ def gap_test(fit: Fit, noise: Noise, trend: NoiseTrend, *, coarse_step: bool) ->
             noisy["noise level"] = level_p_value(fit, noise)
     everything = p_values(fit, floor, noise.spread, scatter) | noisy
     if fit.between is not None:
-        everything["between runs"] = fit.columns.wider(width_prior(fit.problem), fit.widths)
+        everything["between runs"] = fit.columns.wider(fit.widths)
     limit = chosen.detection_rate / len(everything)
     smallest = min(everything.values())
     return GapTest(

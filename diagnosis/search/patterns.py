@@ -13,9 +13,9 @@ import numpy as np
 from scipy.special import chdtri, stdtr
 
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.likelihood.scatter_widths import Between, width_prior
+from diagnosis.likelihood.scatter_widths import Between
 from diagnosis.search.scatter import shown_by
-from identification.campaign.random_effects import marginal
+from identification.campaign.random_effects import Marginal, marginal
 from tunnel_sim.vocabulary.quantities import PerRun
 from tunnel_sim.vocabulary.record import Array
 
@@ -34,7 +34,13 @@ ORDER_CLEARER: Final = 10.0
 """Minimum ratio of the p-values of a condition and of the order of the runs for a difference to be a drift.
 Convention. Strong evidence. Springs are often changed in order, and a cause that follows them is then no drift."""
 
+SCREENED: Final = 3.0
+"""Factor on the greatest squared distance of a pattern from zero, in variances, that the widths without it allow.
+Convention. Patterns whose p-value stays too large even so are not fitted; the factor allows for widths that the prior
+or the other differences bind."""
+
 _ORDER, _GROUPS = "order", "groups"
+_NO_BOUND = 1e-3  # share of the runs' differences outside a pattern that counts as none
 _OF_LINE = 2  # number of parameters of a straight line
 
 
@@ -124,7 +130,7 @@ def with_drifts(fitted: Fit) -> Between | None:
     ]
     for place in drifting:
         columns, _ = columns.with_pattern(place, order.values)
-    return columns.likeliest(width_prior(fitted.problem)) if drifting else None
+    return columns.likeliest() if drifting else None
 
 
 def has_a_cause(fitted: Fit) -> bool:
@@ -179,7 +185,7 @@ def _two_groups(fitted: Fit, place: int, along: str, labels: Array) -> list[Patt
     count = np.bincount(label)
     if where.size < OF_GROUPS or count.size < 2:
         return []
-    prior = width_prior(fitted.problem)
+    prior = fitted.columns.prior
     # free in one quantity only: the runs divide a difference poorly between the wind speed and the spring
     widths = np.where(np.arange(prior.most.size) == place, prior.most, prior.least)
     own = marginal(fitted.columns.products, widths).deviations[where, place]
@@ -211,20 +217,33 @@ def _trend(fitted: Fit, place: int, pattern: Pattern, tried: int) -> Trend | Non
     if count < (IN_ORDER if pattern.along == _ORDER else OF_CONDITION):
         return None
     columns, size = fitted.columns.with_pattern(place, pattern.values)
+    freedom, patterns = count - _OF_LINE, tried * pattern.tried
+    # most patterns are chance, and the widths without the pattern bound its clarity at a tenth of the cost
+    least_clear = _distance(marginal(columns.products, fitted.columns.likeliest().widths))
+    clearest = freedom * least_clear / max(freedom + 1.0 - least_clear, _NO_BOUND)
+    if _by_chance(SCREENED * clearest, freedom, patterns) >= chosen.trend_rate:
+        return None
     if columns.share_apart() < APART:
         return None
-    prior = width_prior(fitted.problem)
-    between = columns.likeliest(prior)
+    between = columns.likeliest()
     beside = between.likeliest
     slope, std = beside.common[-1] / size, float(np.sqrt(beside.covariance[-1, -1])) / size
-    if std <= 0.0:  # only the common parameters change along the campaign
-        return None
-    # only the runs determine the width
-    p_value = min(1.0, tried * pattern.tried * 2.0 * float(stdtr(count - _OF_LINE, -abs(slope) / std)))
+    p_value = _by_chance(_distance(beside), freedom, patterns)
     if p_value >= chosen.trend_rate:
         return None
     every = np.ones(len(scatter), bool)
-    remaining = columns.gain(prior, every, np.arange(every.size) == place)
+    remaining = columns.gain(every, np.arange(every.size) == place)
     only = remaining < chdtri(1.0, chosen.which_scatters_rate)
     name, left = scatter[place].name, float(between.widths[place])
     return Trend(name, float(slope), std, p_value, left, bool(only), pattern.along, pattern.runs)
+
+
+def _distance(found: Marginal) -> float:
+    """Squared distance of the last common parameter from zero, in variances; 0 where it is not determined."""
+    variance = float(found.covariance[-1, -1])
+    return float(found.common[-1]) ** 2 / variance if variance > 0.0 else 0.0
+
+
+def _by_chance(distance: float, freedom: int, tried: float) -> float:
+    """P-value of a squared distance, times the number of patterns tried; only the runs determine the widths."""
+    return min(1.0, tried * 2.0 * float(stdtr(freedom, -np.sqrt(distance))))

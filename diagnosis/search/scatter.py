@@ -22,7 +22,6 @@ from diagnosis.model.chance import Chance, Scatter
 from diagnosis.model.data import Data
 from diagnosis.model.parameters import Point
 from diagnosis.settings import ScatterSettings
-from identification.campaign.random_effects import WidthPrior
 from tunnel_sim.effects import BetweenRuns, Effect
 
 WIDTHS_SETTLED: Final = 1.0
@@ -126,10 +125,10 @@ def scattered(fitted: Fit, kinds: Sequence[type[Effect]]) -> Fit | None:
     if not all(np.all(np.isfinite(c)) and np.all(np.isfinite(r)) for c, r in jacobian):
         return None
     residuals = fitted.residuals if not fitted.problem.scatter else scaled_residuals(problem, point)
-    columns, prior = ScatterColumns.of(problem, point, residuals, jacobian), width_prior(problem)
-    if not _evident(columns, prior, np.ones(len(able), bool), fitted.settings.scatter):
+    columns = ScatterColumns.of(problem, point, residuals, jacobian)
+    if not _evident(columns, fitted.settings.scatter):
         return None
-    layered = try_fit(with_widths(problem, columns.likeliest(prior)), point)
+    layered = try_fit(with_widths(problem, columns.likeliest()), point)
     return None if layered is None else with_likeliest_widths(layered)
 
 
@@ -188,7 +187,7 @@ def evident(fitted: Fit) -> Fit:
     """A fit with chance differences if its runs show more than stated; else as stated."""
     scatter, known = fitted.problem.scatter, fitted.problem.data.repeatability
     if shown := shown_by(fitted):
-        widths = fitted.columns.likeliest(width_prior(fitted.problem)).widths
+        widths = fitted.columns.likeliest().widths
         widened = [
             replace(one, width=float(width), shown=one.name in shown)
             for one, width in zip(scatter, widths, strict=True)
@@ -204,20 +203,20 @@ def shown_by(fitted: Fit) -> tuple[str, ...]:
     scatter, chosen = fitted.problem.scatter, fitted.settings.scatter
     if not scatter:
         return ()
-    columns, prior = fitted.columns, width_prior(fitted.problem)
-    if not _evident(columns, prior, np.ones(len(scatter), bool), chosen):
+    columns = fitted.columns
+    if not _evident(columns, chosen):
         return ()
     able = may_show([one.kind for one in scatter], fitted.problem.data)
-    shown = zip(scatter, _shown(columns, prior, chosen), strict=True)
+    shown = zip(scatter, _shown(columns, chosen), strict=True)
     return tuple(one.name for one, seen in shown if seen and one.kind in able)
 
 
-def _shown(columns: ScatterColumns, prior: WidthPrior, chosen: ScatterSettings) -> Kept:
+def _shown(columns: ScatterColumns, chosen: ScatterSettings) -> Kept:
     """The quantities that differ between the runs; the least needed one is removed repeatedly."""
-    varying = np.ones(prior.usual.size, bool)
+    varying = np.ones(columns.prior.usual.size, bool)
     while varying.sum() > 1:
         places = np.flatnonzero(varying)
-        gains = [columns.gain(prior, varying, np.arange(varying.size) == place) for place in places]
+        gains = [columns.gain(varying, np.arange(varying.size) == place) for place in places]
         least = int(np.argmin(gains))
         if gains[least] >= chdtri(1.0, chosen.which_scatters_rate):
             break
@@ -238,10 +237,11 @@ def named(fitted: Fit) -> tuple[str, ...]:
     return tuple(one.name for one in fitted.problem.scatter if one.shown)
 
 
-def _evident(columns: ScatterColumns, prior: WidthPrior, which: Kept, chosen: ScatterSettings) -> bool:
+def _evident(columns: ScatterColumns, chosen: ScatterSettings) -> bool:
     """Whether the runs differ by more than the least widths."""
-    limit = chdtri(float(which.sum()), chosen.scatter_rate)
-    return bool(columns.gain(prior, np.ones_like(which), which) >= limit)
+    every = np.ones(columns.prior.usual.size, bool)
+    limit = chdtri(float(every.size), chosen.scatter_rate)
+    return bool(columns.gain(every, every) >= limit)
 
 
 def with_likeliest_widths(fitted: Fit, *, rounds: int = _ROUNDS) -> Fit:
@@ -250,8 +250,7 @@ def with_likeliest_widths(fitted: Fit, *, rounds: int = _ROUNDS) -> Fit:
         between = fitted.between
         if between is None:
             return fitted
-        prior = width_prior(fitted.problem)
-        here = fitted.columns.at(fitted.widths, prior)
+        here = fitted.columns.at(fitted.widths)
         if here.restricted - between.restricted < WIDTHS_SETTLED:
             return fitted
         again = try_fit(with_widths(fitted.problem, between), fitted.point, base=fitted)

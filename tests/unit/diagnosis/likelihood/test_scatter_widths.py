@@ -28,11 +28,11 @@ def columns(accuracy: float, seed: int = 3, *, within: bool = False) -> ScatterC
     noise = rng.standard_normal((RUNS, SAMPLES))
     deviations = WIDTH * rng.standard_normal(RUNS)
     seen = [d[:, 0] * e + n for d, e, n in zip(own, deviations, noise, strict=True)]
-    return ScatterColumns([np.zeros((SAMPLES, 0))] * RUNS, own, common, seen)
+    return ScatterColumns([np.zeros((SAMPLES, 0))] * RUNS, own, common, seen, PRIOR)
 
 
 def cost(found: ScatterColumns, known: Array) -> float:
-    return found.likeliest(PRIOR).cost(known)
+    return found.likeliest().cost(known)
 
 
 def test_what_a_set_knows_better_neither_costs_nor_pays() -> None:
@@ -46,7 +46,7 @@ def test_what_a_set_knows_better_neither_costs_nor_pays() -> None:
 
 def test_runs_that_repeat_better_cost_less() -> None:
     rough, fine = columns(0.03 * WIDTH), columns(0.03 * WIDTH)
-    close = ScatterColumns(fine.bases, fine.deviations, fine.common, [0.2 * one for one in fine.residuals])
+    close = ScatterColumns(fine.bases, fine.deviations, fine.common, [0.2 * one for one in fine.residuals], PRIOR)
     known = rough.products.own
     assert cost(rough, known) - cost(close, known) > 2.0 * (RUNS - 1) * np.log(4.0)
 
@@ -56,8 +56,8 @@ def test_few_runs_that_repeat_exactly_have_no_width() -> None:
     found = columns(3e-4 * WIDTH)
     pairs = list(zip(found.residuals, found.deviations, strict=True))[:3]
     noise = [0.1 * (z - d[:, 0] * (d[:, 0] @ z) / (d[:, 0] @ d[:, 0])) for z, d in pairs]
-    few = ScatterColumns(found.bases[:3], found.deviations[:3], found.common[:3], noise)
-    assert few.likeliest(PRIOR).widths[0] < 0.01 * WIDTH
+    few = ScatterColumns(found.bases[:3], found.deviations[:3], found.common[:3], noise, PRIOR)
+    assert few.likeliest().widths[0] < 0.01 * WIDTH
 
 
 @pytest.mark.parametrize(
@@ -67,13 +67,13 @@ def test_runs_show_by_themselves_what_greatest_differences_cannot_hide(
     within: bool, size: float, shown: bool
 ) -> None:
     """Twelve runs know their common deviation to a third of the greatest width, which is 20 widths."""
-    between = columns(0.03 * WIDTH, within=within).likeliest(PRIOR)
+    between = columns(0.03 * WIDTH, within=within).likeliest()
     assert between.shown(np.array([size * WIDTH]), 4.0).tolist() == [shown]
 
 
 def test_a_parameter_that_single_runs_show_costs_nothing_for_being_compared() -> None:
     """One parameter that acts as a deviation does: its variance is the runs' mean, a² + w² for the width w."""
-    found = columns(0.03 * WIDTH).likeliest(PRIOR)
+    found = columns(0.03 * WIDTH).likeliest()
     known = columns(0.03 * WIDTH).products.own
     given, free = found.cost(known, np.array([True])), found.cost(known, np.array([False]))
     assert free == found.cost(known)
@@ -88,8 +88,8 @@ def test_parameters_that_the_runs_do_not_determine_cost_nothing_when_given() -> 
     one = columns(0.03 * WIDTH)
     none = [np.zeros_like(part) for part in one.common]
     common = [np.hstack([part, part, zero]) for part, zero in zip(one.common, none, strict=True)]
-    found = ScatterColumns(one.bases, one.deviations, common, one.residuals).likeliest(PRIOR)
+    found = ScatterColumns(one.bases, one.deviations, common, one.residuals, PRIOR).likeliest()
     known, both = one.products.own, np.array([True, True, True])
     assert found.cost(known, both) == pytest.approx(
-        one.likeliest(PRIOR).cost(known, np.array([True])), abs=0.5
+        one.likeliest().cost(known, np.array([True])), abs=0.5
     )

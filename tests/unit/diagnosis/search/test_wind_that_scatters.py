@@ -11,7 +11,6 @@ from scipy.integrate import solve_ivp
 
 from diagnosis.likelihood import least_squares
 from diagnosis.likelihood.least_squares import Fit, try_fit
-from diagnosis.likelihood.scatter_widths import width_prior
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model import chance
 from diagnosis.model.parameters import Point
@@ -104,7 +103,7 @@ def off() -> tuple[Fit, Fit]:
 
 def away(fitted: Fit) -> float:
     """How far linear theory still moves the last parameter, in standard deviations."""
-    here = fitted.columns.at(fitted.widths, width_prior(fitted.problem))
+    here = fitted.columns.at(fitted.widths)
     return float(abs(here.likeliest.common[-1]) / fitted.std(fitted.problem.names[-1]))
 
 
