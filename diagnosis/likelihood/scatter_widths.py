@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,10 @@ from identification.campaign.random_effects import (
 from tunnel_sim.vocabulary.quantities import PerKind, PerRun
 from tunnel_sim.vocabulary.record import Array
 
+STATED_DECADES: Final = 0.25
+"""Standard deviation of the decimal logarithm of a width about the stated one. Judgement. An experimenter knows the
+scatter to a factor of about two; a width far beyond is more likely a cause."""
+
 #: Minimum share of a column's power that deviations of the runs fail to explain. Smaller differences are
 #: finite-difference errors (1e-11 at most), which would fix an undetermined parameter. True differences may be
 #: as small as 1e-8: an inertia and a stiffness differ so little where a moment is cubic.
@@ -41,13 +46,14 @@ Kept = NDArray[np.bool_]
 
 
 def width_prior(problem: Problem) -> WidthPrior:
-    """The prior of the widths; if the campaign states widths, they are a lower bound."""
+    """The prior of the widths: about a stated width and not below it; about the usual one where none is stated."""
     known = problem.data.repeatability
     usual = np.array([getattr(_USUAL, one.kind.scatters) for one in problem.scatter])
     given = np.array([known.get(one.kind.scatters, 0.0) for one in problem.scatter])
-    least = np.maximum(_USUAL.least * usual, given)
-    decades = np.full(usual.size, _USUAL.decades)
-    return WidthPrior(np.maximum(usual, given), decades, least, np.maximum(_USUAL.most * usual, least))
+    stated = given > 0.0
+    least, most = np.maximum(_USUAL.least * usual, given), np.maximum(_USUAL.most * usual, given)
+    decades = np.where(stated, STATED_DECADES, _USUAL.decades)
+    return WidthPrior(np.where(stated, least, usual), decades, least, most)
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,7 +34,7 @@ ORDER_CLEARER: Final = 10.0
 """Minimum ratio of the p-values of a condition and of the order of the runs for a difference to be a drift.
 Convention. Strong evidence. Springs are often changed in order, and a cause that follows them is then no drift."""
 
-SCREENED: Final = 3.0
+SCREENED: Final = 10.0
 """Factor on the greatest squared distance of a pattern from zero, in variances, that the widths without it allow.
 Convention. Patterns whose p-value stays too large even so are not fitted; the factor allows for widths that the prior
 or the other differences bind."""
