@@ -7,8 +7,8 @@ A finding is a frozen dataclass of typed fields with units; they are also its JS
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Protocol, Self
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
 
 from diagnosis.answer.sizes_by_run import SizeByRun
 from diagnosis.findings.misfit import Misfit
@@ -188,3 +188,22 @@ class NextStep:
     def words(self) -> str:
         """The step with its gain, a sentence."""
         return f"{self.what}{f': {self.gain}' if self.gain else ''}."
+
+
+@dataclass(frozen=True)
+class SecondReading:
+    """What a cause of the answer may be instead, where the runs do not tell the two apart.
+
+    Args:
+        cause: the effect of the answer.
+        instead: the other reading in a few words, such as ``wrong hold``.
+        words: the sentences on it.
+        step: how to tell the two apart.
+        figures: the quantities in the sentences, by name, in JSON's types; the names contain their units.
+    """
+
+    cause: str
+    instead: str
+    words: str
+    step: NextStep
+    figures: Mapping[str, Any] = field(default_factory=dict)

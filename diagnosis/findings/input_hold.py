@@ -7,42 +7,24 @@ records distinguish the two.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from diagnosis.findings.finding import NextStep
+from diagnosis.findings.finding import NextStep, SecondReading
 from diagnosis.likelihood.least_squares import try_fit
 from diagnosis.model.parameters import Point
 from diagnosis.search.study import Study
 from tunnel_sim.effects.capabilities import InputClock
 from tunnel_sim.effects.registry import the_effect
-from tunnel_sim.vocabulary.inputs import Hold
-
-
-@dataclass(frozen=True)
-class OtherHold:
-    """A delay of the input that another hold between its samples explains as well.
-
-    Args:
-        delay_s, half_sample_s: delay, and half a sample interval, s.
-        taken: the hold that the fits assume.
-        stated: whether the campaign states this hold for all driven runs.
-        better: whether the other hold explains the records better, beyond chance.
-    """
-
-    delay_s: float
-    half_sample_s: float
-    taken: Hold
-    stated: bool
-    better: bool
-
 
 DELAY = the_effect(InputClock)
 
 
-def other_hold(study: Study) -> OtherHold | None:
-    """The delay of an answer that another hold explains as well; None if there is no such delay."""
+def other_hold(study: Study) -> SecondReading | None:
+    """The wrong hold that explains the records as well as the delay of an answer; None if there is none."""
     from scipy.special import chdtri  # imported here because it is slow to load
 
     fit, problem = study.chosen, study.chosen.problem
@@ -63,39 +45,34 @@ def other_hold(study: Study) -> OtherHold | None:
         return None
     delay, own = f"{DELAY.name}.{DELAY.parameters()[0].name}", study.similarity.own
     half = 0.5 * float(np.median([run.record.sample_interval for run in study.campaign.driven_runs]))
-    return OtherHold(
-        delay_s=own(fit.value(delay), "s"),
-        half_sample_s=own(half, "s"),
-        taken="zero" if held else "linear",
-        stated=all(drive.hold is not None for drive in study.campaign.inputs),
-        better=bool(fit.unlikelihood - fitted.unlikelihood > chance),
-    )
+    figures = {
+        "delay_s": own(fit.value(delay), "s"),
+        "half_sample_s": own(half, "s"),
+        "taken": "zero" if held else "linear",
+        "stated": all(drive.hold is not None for drive in study.campaign.inputs),
+        "better": bool(fit.unlikelihood - fitted.unlikelihood > chance),
+    }
+    return SecondReading(DELAY.name, "wrong hold", _words(figures), _step(held=held), figures)
 
 
-def hold_words(found: OtherHold | None) -> str:
-    """Sentences on a delay of the input that may be a wrong hold between samples; empty where it may not."""
-    if found is None:
-        return ""
+def _words(found: Mapping[str, Any]) -> str:
     held = "keeps its value between samples, as a controller's command does"
     linear = "is linear between samples"
-    other, taken = (held, "linear") if found.taken == "linear" else (linear, "held")
-    why = "as the campaign states" if found.stated else "since drive_hold is not stated"
-    alike = "better" if found.better else "as well"
-    when = "later" if found.delay_s > 0.0 else "earlier"
-    delay = 1e3 * abs(found.delay_s)
+    other, taken = (held, "linear") if found["taken"] == "linear" else (linear, "held")
+    why = "as the campaign states" if found["stated"] else "since drive_hold is not stated"
+    alike = "better" if found["better"] else "as well"
+    when = "later" if found["delay_s"] > 0.0 else "earlier"
+    delay = 1e3 * abs(found["delay_s"])
     return (
         f"One cause has two interpretations. Either the input acts {delay:.3g} ms {when} than recorded, about half "
-        f"a sample ({1e3 * found.half_sample_s:.3g} ms); or it {other} and was assumed to be {taken}, {why}. "
+        f"a sample ({1e3 * found['half_sample_s']:.3g} ms); or it {other} and was assumed to be {taken}, {why}. "
         f"The second interpretation explains the records {alike}, without a delay."
     )
 
 
-def hold_steps(found: OtherHold | None) -> list[NextStep]:
-    """How to distinguish a delay of the input from a wrong hold; none where not needed."""
-    if found is None:
-        return []
-    other, how = ("zero", "is held") if found.taken == "linear" else ("linear", "is linear")
+def _step(*, held: bool) -> NextStep:
+    other, how = ("linear", "is linear") if held else ("zero", "is held")
     what = (
         f'If the input {how} between samples, state drive_hold = "{other}" for the runs, and diagnose again'
     )
-    return [NextStep(what, "no delay is then needed")]
+    return NextStep(what, "no delay is then needed")

@@ -9,12 +9,11 @@ from diagnosis.findings.closure import shares_of_gap
 from diagnosis.findings.coefficients import UNCERTAIN_FROM
 from diagnosis.findings.disturbed_runs import disturbed_step
 from diagnosis.findings.finding import NextStep
-from diagnosis.findings.input_hold import hold_steps
 from diagnosis.findings.next_run import OTHER_INPUT, OTHER_SPEED, NextRun, source_of_width
 from diagnosis.findings.patch import model_steps
 from diagnosis.findings.place import runs_of_the_gap
 from diagnosis.findings.repeatability import width_text
-from diagnosis.findings.spring_choices import choice_steps, inertia_steps
+from diagnosis.findings.spring_choices import choice_steps
 from diagnosis.findings.terms import CHANNELS, CONDITIONS, SCATTERS, without_scatter
 from diagnosis.findings.whole import Findings
 from diagnosis.search.answer import UNKNOWN
@@ -110,7 +109,7 @@ def _mending(answer: Findings) -> Iterator[NextStep]:
     found += [
         (False, -1.0, NextStep(answer.named_causes.advice(name), "if it is this one")) for name in later
     ]
-    yield from hold_steps(answer.found.hold)
+    yield from (one.step for one in answer.found.readings)
     for _, _, step in sorted(found, key=lambda one: (one[0], -one[1])):
         yield step
 
@@ -234,7 +233,6 @@ def _telling_apart(answer: Findings) -> Iterator[NextStep]:
             f"settles which it is{gain}",
         )
     yield from choice_steps(answer.found.choices)
-    yield from inertia_steps(answer.found.inertia)
 
 
 def _deciding(answer: Findings) -> Iterator[NextStep]:

@@ -1,4 +1,4 @@
-"""What else a wrong spring may be, in words and steps: another spring, or another inertia with this spring."""
+"""What else a wrong spring may be: another spring, or another inertia with this spring."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from scipy.special import chdtri
 
-from diagnosis.findings.finding import NextStep
+from diagnosis.findings.finding import NextStep, SecondReading
 from diagnosis.search.rivals.inertia_by_spring import inertia_in_place
 from diagnosis.search.rivals.rival import RIVAL_RATE
 from diagnosis.search.rivals.two_springs import ONE_SPRING, SpringError, spring_error
@@ -70,8 +70,8 @@ def choice_steps(found: Sequence[SpringError]) -> list[NextStep]:
     ]
 
 
-def other_inertia(study: Study) -> SpringError | None:
-    """The error of the inertia in the runs of one spring that explains as much as its stiffness; None without one.
+def other_inertia(study: Study) -> SecondReading | None:
+    """The other inertia in the runs of one spring that explains as much as its stiffness; None without one.
 
     The decay and the air's part in the frequency tell the two apart, where the runs repeat well enough.
     """
@@ -83,24 +83,14 @@ def other_inertia(study: Study) -> SpringError | None:
     chance = float(chdtri(1.0, RIVAL_RATE)) * (1.0 + max(fit.excess, 0.0))
     if fitted.unlikelihood - fit.unlikelihood > chance:
         return None
-    return spring_error(fitted, name, study.similarity)
-
-
-def inertia_words(found: SpringError | None) -> str:
-    """The inertia that explains as much as another stiffness; empty where the runs exclude it."""
-    if found is None:
-        return ""
-    side = "higher" if found.error > 0.0 else "lower"
-    size = for_people(100.0 * abs(found.error), 100.0 * found.std, "%")
-    return (
-        f"An inertia {size} {side} with the spring of {found.stiffness:g} N m/rad would explain as much: these "
-        "runs do not tell a wrong stiffness from adapters and clamps of another inertia."
+    found = spring_error(fitted, name, study.similarity)
+    spring, side = f"the spring of {found.stiffness:g} N m/rad", "higher" if found.error > 0.0 else "lower"
+    words = (
+        f"An inertia {for_people(100.0 * abs(found.error), 100.0 * found.std, '%')} {side} with {spring} would "
+        "explain as much: these runs do not tell a wrong stiffness from adapters and clamps of another inertia."
     )
-
-
-def inertia_steps(found: SpringError | None) -> list[NextStep]:
-    """How to tell another stiffness from another inertia; none where the runs tell."""
-    if found is None:
-        return []
-    what = f"Weigh the adapter and the clamps of the spring of {found.stiffness:g} N m/rad"
-    return [NextStep(what, "tells another inertia from a wrong stiffness")]
+    step = NextStep(
+        f"Weigh the adapter and the clamps of {spring}", "tells another inertia from a wrong stiffness"
+    )
+    figures = {"stiffness": found.stiffness, "error": found.error, "std": found.std}
+    return SecondReading(ONE_SPRING.name, "another inertia", words, step, figures)

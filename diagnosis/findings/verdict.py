@@ -6,11 +6,10 @@ from collections.abc import Mapping, Sequence
 
 from diagnosis.findings.coefficients import consequence
 from diagnosis.findings.disturbed_runs import disturbed_words, odd_runs
-from diagnosis.findings.input_hold import hold_words
 from diagnosis.findings.other_motions import second_mode_words
 from diagnosis.findings.patch import model_words
 from diagnosis.findings.place import runs_of_the_gap
-from diagnosis.findings.spring_choices import choice_words, inertia_words
+from diagnosis.findings.spring_choices import choice_words
 from diagnosis.findings.terms import (
     BETWEEN_RUNS,
     CHANNELS,
@@ -29,16 +28,14 @@ from identification.show.numbers import (
     rounded_up,
     share,
 )
-from tunnel_sim.effects import effect_class, the_effect
-from tunnel_sim.effects.capabilities import InputClock
+from tunnel_sim.effects import effect_class
 
 
 def headline(answer: Findings) -> tuple[str, str]:
     """The answer in a few words, and its kind: one of ``none``, ``unknown``, ``open``, ``found``."""
     words, kind = _answer_in_words(answer)
-    if answer.found.hold:
-        delay = plain(the_effect(InputClock).name)
-        words = words.replace(delay, f"{delay} or wrong hold")
+    for one in answer.found.readings:
+        words = words.replace(plain(one.cause), f"{plain(one.cause)} or {one.instead}")
     if kind == "found" and not without_scatter(answer.causes) and answer.repeated.systematic(answer):
         words = f"{BETWEEN_RUNS.capitalize()}, not by chance alone"
     return words + odd_runs(answer.disturbed), kind
@@ -76,8 +73,7 @@ def verdict(answer: Findings, rest: str) -> str:
         *(disturbed_words(one, no_gap=not answer.causes) for one in answer.disturbed),
         *_with_second_modes(_answer(answer, rest), answer),
         choice_words(answer.found.choices),
-        inertia_words(answer.found.inertia),
-        hold_words(answer.found.hold),
+        *(one.words for one in found.readings),
         model_words(answer.model, answer),
         *(str(rival.figures["words"]) for rival in found.rivals),
     ]

@@ -24,11 +24,10 @@ from diagnosis.findings.closure import (
 )
 from diagnosis.findings.coefficients import Coefficients
 from diagnosis.findings.decision import IN_COMMON, Decision
-from diagnosis.findings.finding import Answered, Finding, Picture
+from diagnosis.findings.finding import Answered, Finding, Picture, SecondReading
 from diagnosis.findings.fit_view import fit_pictures
 from diagnosis.findings.friction_curve import FrictionCurve
 from diagnosis.findings.hidden import Hidden
-from diagnosis.findings.input_hold import OtherHold
 from diagnosis.findings.judgements import Nearly
 from diagnosis.findings.misfit import Misfit
 from diagnosis.findings.next_run import FurtherRuns, NextRun
@@ -78,8 +77,7 @@ class Found:
         nearly: effects that nearly explain an unexplained gap; None if there are none.
         immaterial: by coefficient, the relative change by the causes, where they change none materially.
         choices: springs of which one is off; the most likely first.
-        inertia: another inertia that explains as much as the stiffness of a spring; None: none.
-        hold: a delay of the input that another hold between samples explains as well; None: none.
+        readings: what causes may be instead, where the runs do not tell.
         rivals: causes from outside the vocabulary that would explain a gap of unknown cause.
         second_modes: second modes by run, where the gap is not explained.
         limit_cycles: the remarks on the runs where every run is in a limit cycle; else none.
@@ -96,8 +94,7 @@ class Found:
     nearly: Nearly | None = None
     immaterial: Mapping[str, float] = field(default_factory=dict)
     choices: tuple[SpringError, ...] = ()
-    inertia: SpringError | None = None
-    hold: OtherHold | None = None
+    readings: tuple[SecondReading, ...] = ()
     rivals: tuple[Fact, ...] = ()
     second_modes: tuple[TwoModes, ...] = ()
     limit_cycles: tuple[Remark, ...] = ()

@@ -76,7 +76,7 @@ def test_it_is_named_with_its_value(delay: float, kinds: Sequence[type[Effect]])
     assert abs(own.value - delay) < 3.0 * own.std < 1e-4
     assert found.gap.closed > 0.99
     assert found.sizes == ()  # it has none in a free decay
-    assert found.found.hold is None  # no hold is wrong by two samples
+    assert found.found.readings == ()  # no hold is wrong by two samples
     # of 4 ms, ωτ is 0.05 at the resonance: a lag of the actuator is then nearly the same
     rival = 0.0 < delay < 0.01 and kinds is ALL_EFFECTS
     said = headline(found)[0]

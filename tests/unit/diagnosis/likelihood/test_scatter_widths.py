@@ -46,7 +46,9 @@ def test_what_a_set_knows_better_neither_costs_nor_pays() -> None:
 
 def test_runs_that_repeat_better_cost_less() -> None:
     rough, fine = columns(0.03 * WIDTH), columns(0.03 * WIDTH)
-    close = ScatterColumns(fine.bases, fine.deviations, fine.common, [0.2 * one for one in fine.residuals], PRIOR)
+    close = ScatterColumns(
+        fine.bases, fine.deviations, fine.common, [0.2 * one for one in fine.residuals], PRIOR
+    )
     known = rough.products.own
     assert cost(rough, known) - cost(close, known) > 2.0 * (RUNS - 1) * np.log(4.0)
 
@@ -90,6 +92,4 @@ def test_parameters_that_the_runs_do_not_determine_cost_nothing_when_given() -> 
     common = [np.hstack([part, part, zero]) for part, zero in zip(one.common, none, strict=True)]
     found = ScatterColumns(one.bases, one.deviations, common, one.residuals, PRIOR).likeliest()
     known, both = one.products.own, np.array([True, True, True])
-    assert found.cost(known, both) == pytest.approx(
-        one.likeliest().cost(known, np.array([True])), abs=0.5
-    )
+    assert found.cost(known, both) == pytest.approx(one.likeliest().cost(known, np.array([True])), abs=0.5)

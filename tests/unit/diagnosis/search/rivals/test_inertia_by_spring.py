@@ -80,7 +80,7 @@ def test_a_spring_that_is_not_as_stiff_as_stated_keeps_its_name() -> None:
     wrong = decays(dict.fromkeys(BY_SPRING, 0.0), {28.3: 0.005})
     found = diagnose(wrong, kinds=KINDS[::2], rivals=(InertiaBySpring(),))
     assert tuple(found.causes) == ("spring_miscalibration",)
-    assert found.found.inertia is None  # the decays tell
+    assert found.found.readings == ()  # the decays tell
 
 
 def test_runs_that_scatter_do_not_tell_a_wrong_spring_from_another_inertia() -> None:
@@ -89,8 +89,9 @@ def test_runs_that_scatter_do_not_tell_a_wrong_spring_from_another_inertia() -> 
     adapter = replace(decays(BY_SPRING | {28.3: 0.005, 44.84: 0.0}, scatter=2e-4), repeatability=stated)
     found = diagnose(adapter, kinds=[effect_class("spring_miscalibration")])
     assert tuple(found.causes) == ("spring_miscalibration",)
-    assert found.found.inertia.stiffness == pytest.approx(28.3)
-    assert found.found.inertia.error == pytest.approx(0.005, abs=1e-3)
+    (reading,) = found.found.readings
+    assert reading.figures["stiffness"] == pytest.approx(28.3)
+    assert reading.figures["error"] == pytest.approx(0.005, abs=1e-3)
     assert "with the spring of 28.3 N m/rad would explain as much" in found.verdict
     assert any(step.startswith("Weigh the adapter and the clamps") for step in next_steps(found))
 
