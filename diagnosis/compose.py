@@ -375,6 +375,7 @@ def _predictions(
     """The success of the answer's predictions."""
     closes, repeats = answered.closes, answered.repeats
     gap, patterns = closes.gap, () if repeats is None else repeats.trends
+    spreads = () if repeats is None else repeats.spreads
     return Predictions(
         held_out=gap.closed,
         ahead=gap.closed_ahead,
@@ -385,6 +386,7 @@ def _predictions(
         still_air=left_in_still_air(answered.study),
         size=max((one.differs_by for one in answered.sizes), default=None),
         pattern=max((abs(one.change) for one in patterns if one.of_condition), default=None),
+        scatter=max((one.over_expected for one in spreads if one.shown), default=None),
         elsewhere=isinstance(place, PlaceFound) and place.elsewhere,
     )
 

@@ -28,7 +28,7 @@ from identification.campaign.random_effects import (
     marginal,
     width_quantiles,
 )
-from tunnel_sim.effects import ALL_EFFECTS
+from tunnel_sim.effects import ALL_EFFECTS, effect_class
 from tunnel_sim.vocabulary.record import Array
 
 LIMIT_TOLD: Final = 0.5
@@ -55,6 +55,11 @@ class Spread:
     stated: float | None
     shown: bool
     deviations: dict[str, float]
+
+    @property
+    def over_expected(self) -> float:
+        """Lower end of the interval over the stated width, or over the usual one where none is stated, a ratio."""
+        return self.interval[0] / (self.stated or effect_class(self.effect).parameters()[0].scale)
 
 
 @dataclass(frozen=True)

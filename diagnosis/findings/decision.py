@@ -37,6 +37,10 @@ STILL_AIR_LEAVES: Final = 0.02
 """Maximum share of the gap in still air that the steady causes beside a random moment leave in these runs
 alone, for a decided answer. Estimated. It is 0.003 at most for seven right sets of steady causes in simulated
 campaigns, and 0.05 in a false answer. They are not an independent test."""
+WIDE_SCATTER: Final = 2.0
+"""Maximum lower end of the interval of a scatter between runs, over its stated or usual width, for a decided
+answer. Estimated. In decided answers to simulated campaigns it is 1.8 at most where the causes are right; of ten
+answers beyond 2.0 none is right. They are not an independent test."""
 ANSWERS_NAMED: Final = 5
 """Maximum number of likely answers in a sentence. Judgement."""
 IN_COMMON: Final = 0.9
@@ -132,6 +136,12 @@ _REASONS: Mapping[str, _Reason] = {
             "of the plan"
         ),
     ),
+    "scatter": _Reason(
+        lambda found, _: found > WIDE_SCATTER,
+        lambda found, s: (
+            f"need{s} at least {significant(found, 2)} times the scatter that is stated or usual"
+        ),
+    ),
     "elsewhere": _Reason(lambda found, _: bool(found), lambda *_: "the residuals point elsewhere"),
 }
 """Reasons by the field of `Predictions`, the most basic first."""
@@ -151,6 +161,7 @@ class Predictions:
         size: largest standard deviation of a cause's size between the runs, beyond its errors, over the size.
         still_air: share of the gap that the steady causes beside a random moment leave in still air, fitted alone.
         pattern: largest relative difference between the runs that follows a condition of the plan, a fraction.
+        scatter: lower end of the interval of the scatter between runs, over its stated or usual width, a ratio.
         elsewhere: whether the residuals show a place at which no cause of the answer acts.
     """
 
@@ -163,6 +174,7 @@ class Predictions:
     size: float | None = None
     still_air: float | None = None
     pattern: float | None = None
+    scatter: float | None = None
     elsewhere: bool = False
 
     def doubts(self, against_unknown: float = math.inf) -> tuple[Doubt, ...]:
@@ -199,15 +211,13 @@ class Decision:
     unpredictive: str = ""
     doubts: tuple[Doubt, ...] = ()
 
-    @property
-    def in_doubt_of_place(self) -> bool:
-        """Whether the residuals show a place at which the causes of the answer do not act."""
-        return any(one.kind == "elsewhere" for one in self.doubts)
+    def in_doubt(self, kind: str) -> bool:
+        """Whether a prediction leaves a doubt about the answer.
 
-    @property
-    def in_doubt_of_pattern(self) -> bool:
-        """Whether the differences between the runs follow a condition of the plan."""
-        return any(one.kind == "pattern" for one in self.doubts)
+        Args:
+            kind: of the doubt, as in `Doubt`.
+        """
+        return any(one.kind == kind for one in self.doubts)
 
     def words(self, runs: str) -> str:
         """Sentences on an undecided diagnosis: the common part of its answers and the alternatives.
@@ -227,10 +237,10 @@ class Decision:
         together = probability(sum(value for _, value in self.credible))
         if self.unpredictive:
             best = among_answers(self.unpredictive).capitalize()
-            alone = len(without_scatter(self.unpredictive.split(" + "))) == 1
+            alone = len(without_scatter(self.unpredictive.split(" + "))) <= 1
             doubts = " and ".join(doubt.words(one=alone) for doubt in self.doubts)
             said += f"{best} fit{'s' if alone else ''} best, but {doubts}"
-            said += f": look at {runs} there first. " if self.in_doubt_of_place else ". "
+            said += f": look at {runs} there first. " if self.in_doubt("elsewhere") else ". "
         return (
             f"{said}The answer is one of these, with a total probability of {together}: {self._likeliest()}."
         )

@@ -237,14 +237,20 @@ def _telling_apart(answer: Findings) -> Iterator[NextStep]:
 
 def _deciding(answer: Findings) -> Iterator[NextStep]:
     """Steps that decide between the likely answers."""
-    if answer.decision.in_doubt_of_place:
+    if answer.decision.in_doubt("elsewhere"):
         runs = runs_of_the_gap(answer.where, answer.found.place)
         yield NextStep(
             f"Look at {runs} where the residuals point (Where), before any cause",
             "the likeliest cause acts elsewhere",
         )
-    if answer.decision.in_doubt_of_pattern:
+    if answer.decision.in_doubt("pattern"):
         yield from answer.repeated.pattern_steps
+    if answer.decision.in_doubt("scatter"):
+        yield NextStep(
+            "If the rig is known to repeat no better, state [repeatability], and diagnose again; else look for "
+            "what changes from run to run, such as adapters and clamps",
+            "the runs differ by more than is usual",
+        )
     run, robot = run_to_make(answer), answer.found.robot
     if run is not None:
         yield NextStep(

@@ -15,13 +15,13 @@ SCATTERED = ("wind_speed_scatter", "stiffness_scatter", "damping_scatter")
 """Effects that act by chance between the runs."""
 
 
-def scattered(seed: int = 5) -> Campaign:
-    """Twelve runs in closed form, with scatter of 0.3 % in speed, 0.05 % in stiffness and 1 % in damping."""
+def scattered(seed: int = 5, stiffness_scatter: float = 5e-4) -> Campaign:
+    """Twelve runs in closed form, with scatter of 0.3 % in speed and 1 % in damping."""
     rng, time, runs = np.random.default_rng(seed), np.arange(0.0, 7.0, 0.01), []
     base = campaign(duration=0.1)
     for number in range(12):
         like = base.runs[number % len(base.runs)]
-        spring = like.spring_stiffness * (1.0 + 5e-4 * rng.standard_normal())
+        spring = like.spring_stiffness * (1.0 + stiffness_scatter * rng.standard_normal())
         speed = like.wind_speed * (1.0 + 3e-3 * rng.standard_normal())
         damper = DAMPING * (1.0 + 1e-2 * rng.standard_normal())
         area = 0.5 * 1.2 * 0.036 * 0.625

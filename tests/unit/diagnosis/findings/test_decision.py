@@ -54,7 +54,11 @@ def test_the_credible_set_is_the_smallest_with_nine_tenths():
             Predictions(held_out=0.98, still_air=0.052),
             "leaves 5.2 % of the gap in the runs in still air, fitted alone",
         ),
-        (Predictions(held_out=0.2, ahead=0.2, patched=0.2, left=0.09, part=1.0), ""),
+        (
+            Predictions(held_out=0.98, scatter=2.6),
+            "needs at least 2.6 times the scatter that is stated or usual",
+        ),
+        (Predictions(held_out=0.2, ahead=0.2, patched=0.2, left=0.09, part=1.0, scatter=1.8), ""),
         (Predictions(), ""),
     ],
 )

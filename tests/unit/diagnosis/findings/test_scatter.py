@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
+from diagnosis import diagnose
 from diagnosis.findings.next_steps import next_steps
 from diagnosis.findings.repeatability import Spread, width_text
 from diagnosis.findings.sections import diagnosis_brief
@@ -22,6 +24,9 @@ from tests.support.rendered import (
     waterfall_table,
     where_words,
 )
+from tests.support.scattered_runs import SCATTERED, scattered
+from tunnel_sim.effects import effect_class
+from tunnel_sim.vocabulary.campaign import Repeatability
 
 Document = dict[str, Any]
 SPEED, SPRING, DAMPING = range(3)
@@ -276,3 +281,14 @@ def test_one_quantity_that_is_not_determined_is_said(given: Document) -> None:
     assert "frequency less than 0.01 %, damping not determined, since" in repeatability_line(
         findings_of(given)
     )
+
+
+def test_scatter_far_beyond_the_usual_is_no_decided_cause_unless_the_campaign_states_it() -> None:
+    wide, kinds = scattered(stiffness_scatter=2.5e-3), [effect_class(name) for name in SCATTERED]
+    found = diagnose(wide, kinds=kinds, rivals=())
+    assert "stiffness_scatter" in found.causes
+    assert [doubt.kind for doubt in found.decision.doubts] == ["scatter"]
+    assert any("state [repeatability]" in step for step in next_steps(found))
+    stated = Repeatability(wind_speed=3e-3, spring_stiffness=2.5e-3, mechanical_damping=1e-2)
+    assert diagnose(replace(wide, repeatability=stated), kinds=kinds, rivals=()).decided
+    assert diagnose(scattered(), kinds=kinds, rivals=()).decided
