@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from pathlib import Path
 
 import pytest
@@ -37,7 +38,10 @@ def names_in(source: str) -> list[str]:
 
 def test_no_effect_is_named_outside_its_home() -> None:
     assert len(FILES) > 100  # the walk walks
-    found = {path.relative_to(ROOT): names_in(path.read_text(encoding="utf-8")) for path in FILES}
+    texts = {path.relative_to(ROOT): path.read_text(encoding="utf-8") for path in FILES}
+    mentioned = re.compile("|".join(NAMES | CLASSES))  # most files are not worth parsing
+    found = {path: names_in(text) for path, text in texts.items() if mentioned.search(text)}
+    assert found
     assert {path: names for path, names in found.items() if names} == {}
 
 

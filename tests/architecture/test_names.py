@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import ast
+import re
 from collections import Counter, defaultdict
 
-from tests.support.sources import ROOT, SOURCES, modules, parsed
+from tests.support.sources import ROOT, SOURCES, modules
 
 ON_EVERY_LEVEL = {"__init__.py", "__main__.py", "CMakeLists.txt", "README.md", "py.typed"}
 
@@ -13,9 +13,8 @@ ON_EVERY_LEVEL = {"__init__.py", "__main__.py", "CMakeLists.txt", "README.md", "
 def test_no_public_class_name_is_defined_twice() -> None:
     places = defaultdict(list)
     for module, path in modules().items():
-        for node in parsed(path).body:
-            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
-                places[node.name].append(module)
+        for name in re.findall(r"^class ([A-Za-z]\w*)", path.read_text(encoding="utf-8"), re.MULTILINE):
+            places[name].append(module)
     assert len(places) > 400
     assert {name: found for name, found in places.items() if len(found) > 1} == {}
 

@@ -53,6 +53,9 @@ def imported(path: Path) -> Iterator[str]:
 def circles(graph: Mapping[str, frozenset[str]]) -> list[list[str]]:
     """The groups of nodes that lead back to themselves, sorted; a node that leads to itself alone is not one."""
 
+    while ends := {node for node, onward in graph.items() if not onward & graph.keys()}:
+        graph = {node: onward - ends for node, onward in graph.items() if node not in ends}
+
     def reached(start: str) -> frozenset[str]:
         seen, ahead = set[str](), [*graph[start]]
         while ahead:
