@@ -56,7 +56,3 @@ def test_reading_a_campaign_by_the_face_loads_no_engine() -> None:
     modules = imported_by("from tunnel_sim import Campaign, TunnelError, load_plan, read_campaign")
     assert "polars" in modules
     assert not modules & {"mujoco", "scipy"}
-
-
-def test_simulating_by_the_face_loads_the_engine() -> None:
-    assert "mujoco" in imported_by("from tunnel_sim import simulate")

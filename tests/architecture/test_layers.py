@@ -130,6 +130,7 @@ def test_reading_and_identifying_a_campaign_never_imports_the_engine() -> None:
         "from identification.datasets import measured_campaign\n"
         "campaign = measured_campaign('rotary-pendulum')\n"
         "assert identify(campaign, 'output_error').runs\n"
+        "assert identify(campaign, 'neural_network', throw=False).runs\n"
     )
     assert "identification" in modules
     assert not modules & {"mujoco", "gymnasium", "torch", "matplotlib"}

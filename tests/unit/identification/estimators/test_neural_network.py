@@ -1,9 +1,6 @@
 """The networks on records: what they read, what they refuse, and what a window's noise does."""
 
-import subprocess
-import sys
 from itertools import pairwise
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -17,8 +14,6 @@ from tests.reference.free_decays import damped_cosine
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
-
-ROOT = Path(__file__).parents[4]
 
 
 def record(zeta, omega_n, *, cycles=12.0, noise=0.0, rng=None, rate=1000.0, held=0.0, release=0.35):
@@ -123,17 +118,6 @@ def test_a_record_of_a_small_part_of_a_cycle_has_no_windows():
 def test_weights_that_are_not_there_are_bad_input(tmp_path):
     with pytest.raises(TunnelError, match=r"nothing\.safetensors: no such file"):
         estimated(record(0.01, 12.5), tmp_path / "nothing.safetensors")
-
-
-def test_using_the_networks_does_not_import_torch():
-    script = (
-        "import sys\n"
-        "from identification import identify\n"
-        "from identification.datasets import measured_campaign\n"
-        "identify(measured_campaign('rotary-pendulum'), 'neural_network', throw=False)\n"
-        "assert not {'torch', 'mujoco', 'matplotlib'} & set(sys.modules), sorted(sys.modules)\n"
-    )
-    subprocess.run([sys.executable, "-c", script], cwd=ROOT, check=True)
 
 
 def test_the_mean_of_a_window_takes_each_sample_for_the_step_around_it():
