@@ -82,23 +82,44 @@ def unexamined(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def causes_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Diagnose without a formula for the residual, and without MuJoCo's simulation of the answer.
+def with_odd_runs() -> None:
+    """Beside `causes_alone`: runs that differ from the others as a whole are sought all the same."""
 
-    The first takes most of the time where a gap is not explained, the second up to a fifth where it is. They
-    change neither causes nor coefficients, and have tests of their own (``test_explain.py``, ``test_closing.py``).
+
+@pytest.fixture
+def causes_alone(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> None:
+    """Diagnose without a formula for the residual, MuJoCo's simulation of the answer, and a search for odd runs.
+
+    The first takes most of the time where a gap is not explained, each of the others up to a fifth where it is.
+    They change neither causes nor coefficients where no run is odd, and have tests of their own
+    (``test_explain.py``, ``test_closing.py``, ``test_odd_run.py``).
     """
+    _with_causes_alone(monkeypatch, odd_runs="with_odd_runs" in request.fixturenames)
+
+
+@pytest.fixture(scope="module")
+def causes_alone_throughout(request: pytest.FixtureRequest) -> Iterator[None]:
+    """The same for all tests of a file, and for the answers that they share."""
+    with pytest.MonkeyPatch.context() as patch:
+        _with_causes_alone(patch, odd_runs="with_odd_runs" in request.fixturenames)
+        yield
+
+
+def _with_causes_alone(patch: pytest.MonkeyPatch, *, odd_runs: bool) -> None:
     from diagnosis.findings import closing
     from diagnosis.model.parameters import Point
     from diagnosis.remainder import ways
 
     for search in ("closable", "closable_driven"):
-        monkeypatch.setattr(ways, search, lambda *_, **__: None)
+        patch.setattr(ways, search, lambda *_, **__: None)
 
     def by_the_integrator_of_the_fits(problem: Any, common: Any, release: Any) -> list[Any]:
         return [problem.predict([Point(row, release)])[0][run] for run, row in enumerate(common)]
 
-    monkeypatch.setattr(closing, "mujoco_blocks", by_the_integrator_of_the_fits)
+    patch.setattr(closing, "mujoco_blocks", by_the_integrator_of_the_fits)
+    if not odd_runs:
+        patch.setattr("diagnosis.search.disturbed.odd_alone", lambda *_: ())
+        patch.setattr("diagnosis.search.investigate.odd_runs", lambda *_: ())
 
 
 @pytest.fixture
