@@ -19,6 +19,8 @@ from tests.reference.scattering import THREE_SPRINGS, USUAL, scattering
 from tunnel_sim.effects import BetweenRuns, known_effects
 from tunnel_sim.vocabulary.between_runs import SCATTERED, Repeatability
 
+pytestmark = pytest.mark.usefixtures("unexamined")
+
 SHAPE = {"noise": 5e-4, "duration": 6.0, "rate": 100.0}
 COEFFICIENTS = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
 

@@ -17,6 +17,8 @@ from tests.support.gap_campaigns import campaign
 from tunnel_sim.effects import effect_from
 from tunnel_sim.vocabulary.errors import TunnelError
 
+pytestmark = pytest.mark.usefixtures("unexamined")
+
 ROWS = paper_springs()
 STIFFNESS = np.array([row.stiffness_n_m_per_rad for row in ROWS])
 FREQUENCY = np.array([row.frequency_hz for row in ROWS])

@@ -14,6 +14,8 @@ from tests.reference.free_decays import TWELVE, Setting, campaign, damped_cosine
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
 
+pytestmark = pytest.mark.usefixtures("unexamined")
+
 
 def test_long_records_give_output_errors_values_and_deviations():
     data = campaign(TWELVE[:4], noise=5e-4, rng=np.random.default_rng(8))

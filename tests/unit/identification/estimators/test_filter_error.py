@@ -11,6 +11,8 @@ from tunnel_sim.vocabulary.input_kinds import InputColumn
 from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.record import Array, Record
 
+pytestmark = pytest.mark.usefixtures("unexamined")
+
 RATE, INERTIA, DAMPING, SPRING, NOISE, GAIN = 100.0, 0.1, 0.1, 16.0, 5e-4, 2.5
 TIME = np.arange(1500) / RATE
 KICKS = 10  # a sample

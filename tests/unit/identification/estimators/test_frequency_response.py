@@ -29,6 +29,8 @@ from tunnel_reference.true_conditions import DrivenInput
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Record
 
+pytestmark = pytest.mark.usefixtures("unexamined")
+
 RIG = replace(
     rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 25.0), (0.1,) * 4, duration=8.0, sample_rate=250.0),
     start_rate=np.full(4, 0.3),

@@ -14,6 +14,8 @@ from tests.marks import slow
 from tests.reference.free_decays import RESOLUTION, TWELVE, Setting, Truth, campaign, with_records
 from tunnel_sim.vocabulary.record import Record
 
+pytestmark = pytest.mark.usefixtures("unexamined")
+
 
 @pytest.mark.parametrize("stiffness", [0.0, 1e-30, 1e-300])
 def test_a_motion_that_is_a_constant_cannot_be_distinguished_from_the_zero(stiffness):

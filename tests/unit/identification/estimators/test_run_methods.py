@@ -12,6 +12,8 @@ from tests.marks import slow
 from tests.reference.free_decays import TWELVE, Setting, campaign
 from tunnel_sim.vocabulary.record import Record
 
+pytestmark = pytest.mark.usefixtures("unexamined")
+
 
 def decaying(law, *, frequency=2.0, noise=0.0, seed=1):
     """A run whose envelope obeys dA/dt = −law(A), by small steps, as a campaign of one."""

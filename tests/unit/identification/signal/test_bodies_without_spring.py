@@ -15,6 +15,8 @@ from tunnel_sim.vocabulary.input_kinds import InputColumn
 from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.record import Record
 
+pytestmark = pytest.mark.usefixtures("unexamined")
+
 RATE, INERTIA, DAMPING, NOISE, OFFSET = 200.0, 0.1, 0.15, 5e-4, 0.3
 TIME = np.arange(3000) / RATE
 DECAY = DAMPING / INERTIA

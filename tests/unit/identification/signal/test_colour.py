@@ -14,9 +14,12 @@ from identification.campaign.derivatives import noise_statuses
 from identification.signal.colour import Autoregression, Periodogram, levinson
 from identification.signal.noise import PeakNoise, ReadingNoise, Residual, noise_of
 from identification.statistics import inverse, sandwich_covariance
+from tests.marks import slow
 from tests.reference.free_decays import SIX, campaign, with_records
 from tunnel_sim.vocabulary.campaign import SensorProperties
 from tunnel_sim.vocabulary.record import Array
+
+pytestmark = pytest.mark.usefixtures("unexamined")
 
 COUNT, CYCLE = 5000, 125.0
 SILENT = SensorProperties(500.0, None, None)
@@ -168,7 +171,7 @@ def test_runs_of_different_noise_are_weighed_by_its_power() -> None:
     assert mixed == pytest.approx(whole @ (informations[0] + 5.0 * informations[1]) @ whole)
 
 
-@pytest.mark.parametrize("estimator", ["output_error", "conventional", "hilbert", "filter_error"])
+@pytest.mark.parametrize("estimator", ["output_error", "conventional", slow("hilbert"), slow("filter_error")])
 def test_estimates_in_coloured_noise_have_no_status_and_its_deviations(estimator: str) -> None:
     rng = np.random.default_rng(10)
 

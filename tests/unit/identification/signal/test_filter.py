@@ -10,6 +10,8 @@ from identification.signal.filter import Driven, fit_driven, innovations
 from identification.signal.free_decay import Decay, free_decay
 from tests.reference.free_decays import TWELVE, Setting, campaign, with_records
 
+pytestmark = pytest.mark.usefixtures("unexamined")
+
 DECAY, INTERVAL, VARIANCE = Decay.from_modal(12.5, 0.015), 0.02, 1e-8
 
 

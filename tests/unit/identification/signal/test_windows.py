@@ -13,6 +13,8 @@ from tests.reference.free_decays import Setting, campaign, with_records
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
 
+pytestmark = pytest.mark.usefixtures("unexamined")
+
 SETTING = (Setting(16.12, 0.0),)
 
 
