@@ -14,7 +14,7 @@ from tunnel_sim.physics.run_settings import RodTwist, RunSettings, Series
 from tunnel_sim.vocabulary.plan import AeroDerivatives
 
 RIG = load_rig()
-DURATION, SAMPLE_RATE = 4.0, 1000.0
+DURATION, SAMPLE_RATE = 2.5, 1000.0
 GUSTS = Series(tuple(20.0 + np.random.default_rng(5).normal(0.0, 1.0, 21)), 0.5)
 TURBULENCE = Series(tuple(np.random.default_rng(6).normal(0.0, 0.02, 101)), 0.1)
 

@@ -49,7 +49,7 @@ def examined_once():
         yield
 
 
-whole_campaign = cache(partial(campaign, rate=500.0))
+whole_campaign = cache(partial(campaign, rate=250.0))
 
 
 def noisy_campaign(**options):
@@ -286,7 +286,7 @@ QUICK = ("wind-off only", "no size", "no stiffness", "some without stiffness")
 @cache
 def partial_campaign(case):
     settings, options, *_ = PARTIAL[case]
-    return campaign(settings, noise=5e-4, rate=500.0, rng=np.random.default_rng(5), **options)
+    return campaign(settings, noise=5e-4, rate=250.0, rng=np.random.default_rng(5), **options)
 
 
 @each_estimator
