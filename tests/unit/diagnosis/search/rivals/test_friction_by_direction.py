@@ -18,7 +18,7 @@ from diagnosis import diagnose, vocabulary
 from diagnosis.result import Diagnosis
 from diagnosis.search.answer import UNKNOWN
 from diagnosis.search.rivals import RIVALS
-from diagnosis.search.rivals.friction_by_direction import FrictionByDirection, _grip
+from diagnosis.search.rivals.friction_by_direction import FrictionByDirection, _grip, _words
 from diagnosis.search.rivals.rival import Rival
 from tests.marks import slow
 from tests.reference.robot_joints import GEAR, LEVEL, NOISE, RATE, TIME, multisine, robot
@@ -27,7 +27,7 @@ from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorP
 from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.record import Array, Record
 
-pytestmark = pytest.mark.usefixtures("causes_alone", "models_in_this_process")
+pytestmark = pytest.mark.usefixtures("causes_alone_throughout", "models_in_this_process")
 
 MODEL = robot(TRUE, axis=LEVEL, tip=0.2)
 INERTIA, WEIGHT, DAMPING = inertia(MODEL), 9.81 * (1.5 * 0.2 + 0.2 * 0.4), 0.4  # kg m2, N m, N m s/rad
@@ -144,7 +144,8 @@ def test_a_share_of_the_load_that_differs_is_said_with_both_sizes(
     assert "dead zone" not in found.verdict
 
 
-@pytest.mark.parametrize(("seed", "yields"), [(5, 0.0), slow(6, 0.015)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("seed", "yields"), [(5, 0.0), (6, 0.015)])
 def test_a_moment_that_differs_is_said_with_both_sizes(tmp_path: Path, seed: int, yields: float) -> None:
     found = answer(tmp_path, driven(seed, yields, moments=(0.2, 0.3)))
     assert tuple(found.causes) == UNKNOWN
@@ -171,6 +172,16 @@ def test_friction_without_direction_keeps_its_name(
     found = answer(tmp_path, driven(7, yields, **sizes))
     assert found.causes == ("coulomb_friction",)
     assert stated(found) is None
+
+
+def test_a_moment_that_differs_is_said_with_what_looks_alike() -> None:
+    sizes = {"drive": {"value": 0.2, "std": 0.001}, "back_drive": {"value": 0.3, "std": 0.001}}
+    found = {"differs": ["moment"], "moment": sizes, "back_driven": 0.3, "beside": []}
+    assert "would explain the gap; it is not in the vocabulary. It is 0.2000 ± 0.0010 N m in drive" in _words(
+        found
+    )
+    assert _words(found).endswith("30.0 % of the travel. A dead zone of the actuator would look alike.")
+    assert "dead zone" not in _words(found | {"differs": ["share"]})
 
 
 def test_the_grip_of_a_contact_is_dahls() -> None:

@@ -16,7 +16,7 @@ from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorP
 from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.record import Record
 
-pytestmark = pytest.mark.usefixtures("causes_alone")
+pytestmark = pytest.mark.usefixtures("causes_alone_throughout")
 
 RATE, NOISE = 200.0, 2e-4  # Hz, rad
 MOTOR, LINK, DAMPING = 0.06, 0.04, 0.2  # kg m2, kg m2, N m s/rad at the motor
@@ -64,10 +64,10 @@ def filtered(moment):
 
 
 def joint(system, sensor=0, acting=lambda moment: moment, colour=0.0):
-    """Three runs of a joint that nothing holds, with the angle of one of its inertias."""
+    """Two runs of a joint that nothing holds, with the angle of one of its inertias."""
     step, gain = transition(*system)
     rng, time, runs = np.random.default_rng(1), np.arange(0.0, 6.0, 1.0 / RATE), []
-    for number in range(3):
+    for number in range(2):
         lines = np.outer(time, np.arange(0.2, 14.0, 0.2))
         moment = np.sin(2.0 * np.pi * (lines + rng.uniform(size=lines.shape[1]))).sum(axis=1) / 6.0
         state, angle = np.zeros(len(gain)), np.empty(time.size)
