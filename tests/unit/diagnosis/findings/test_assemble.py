@@ -124,13 +124,13 @@ def named():
     return answer, steps, studies[0]
 
 
-_LONG = ("pair", "hum only", "hum and an effect", "coarse step only", "normalised, named")
+_LONG = ("no gap", "pair", "hum only", "hum and an effect", "coarse step only", "normalised, named")
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.slow) if name in _LONG else name for name in CASES]
-)
-def test_every_kind_of_answer_is_a_document_of_the_schema(name):
+@pytest.mark.parametrize("name", [slow(name) if name in _LONG else name for name in CASES])
+def test_every_kind_of_answer_is_a_document_of_the_schema(name, request):
+    if name == "unknown":
+        request.getfixturevalue("causes_alone")
     make, causes = CASES[name]
     data = make()
     document = checked(named()[0] if name == "named" else diagnose(data, kinds=FEW))

@@ -20,7 +20,7 @@ from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.plan import AeroDerivatives
 from tunnel_sim.vocabulary.record import Array, Record
 
-pytestmark = pytest.mark.usefixtures("causes_alone")
+pytestmark = pytest.mark.usefixtures("causes_alone_throughout")
 
 OMEGA, ZETA = 40.0, 0.02
 RINGING = OMEGA * sqrt(1.0 - ZETA**2)

@@ -15,6 +15,7 @@ from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
 from diagnosis.search.investigate import investigate, nominal_study
+from tests.marks import slow
 from tests.support.diagnosis_document import document, findings_of
 from tests.support.gap_campaigns import CN_BETA, CN_R, NOISE, campaign, nominal, studied
 from tests.support.rendered import hidden_line, hidden_table
@@ -83,7 +84,7 @@ def test_an_offset_of_the_only_wind_speed_is_not_listed():
     assert set(found) == {"unsteady_aero_lag"}
 
 
-@pytest.mark.parametrize("lag", [0.01, -0.01])
+@pytest.mark.parametrize("lag", [0.01, slow(-0.01)])
 def test_cn_r_without_a_named_lag_is_the_derivative_in_phase_with_the_rate(lag):
     """The lag is no error of Cnr, and its upper limit does not widen the interval."""
     data = campaign(effect_from("unsteady_aero_lag", {"lag": lag}))
@@ -97,6 +98,7 @@ def test_cn_r_without_a_named_lag_is_the_derivative_in_phase_with_the_rate(lag):
     assert "hidden effects" not in given.shares
 
 
+@pytest.mark.slow
 def test_the_upper_limit_of_a_lag_beside_scatter_is_confirmed_by_a_refit():
     """Chance differences absorb the second order of a small lag; linear theory alone allows ten times as much."""
     kind = effect_class("unsteady_aero_lag")
@@ -231,6 +233,7 @@ def test_a_drop_that_no_refit_confirms_does_not_prevent_a_limit(monkeypatch):
     assert found.size.value == pytest.approx(limit, rel=0.2)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("causes_alone")
 def test_a_further_effect_that_coloured_noise_takes_up_is_said_to_be_significant():
     """A drift of 1.5 mrad in every run, beside vortices in coloured noise that is twice as large as the white."""

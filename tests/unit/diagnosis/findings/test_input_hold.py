@@ -24,7 +24,7 @@ from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorP
 from tunnel_sim.vocabulary.inputs import Hold, Input
 from tunnel_sim.vocabulary.record import Record
 
-pytestmark = pytest.mark.usefixtures("causes_alone")
+pytestmark = pytest.mark.usefixtures("causes_alone_throughout")
 
 RATE, INERTIA, DAMPING, SPRING, NOISE = 200.0, 0.1, 0.05, 16.0, 3e-4
 HALF = 0.5 / RATE

@@ -14,7 +14,7 @@ from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
 
-pytestmark = pytest.mark.usefixtures("causes_alone")
+pytestmark = pytest.mark.usefixtures("causes_alone_throughout")
 
 
 def campaign(*modes: tuple[float, float, float], seconds: float = 20.0) -> Campaign:
@@ -161,7 +161,7 @@ def test_a_second_mode_is_an_answer_however_large_and_whatever_the_sensor_measur
     assert frequency == pytest.approx(2.0 * np.pi * 1.75, rel=1e-3)
 
 
-@pytest.mark.parametrize("form", ["drift", "step"])
+@pytest.mark.parametrize("form", ["drift", slow("step")])
 def test_a_wandering_zero_is_not_a_missed_motion(form):
     """It holds far more than a hundredth of the power."""
     time, rng = np.arange(1500) / 100.0, np.random.default_rng(1)

@@ -22,7 +22,7 @@ from tunnel_sim.vocabulary.campaign import RigProperties
 from tunnel_sim.vocabulary.dimensions import dimension
 from tunnel_sim.vocabulary.freedom import DISPLACEMENT
 
-pytestmark = pytest.mark.usefixtures("causes_alone")
+pytestmark = pytest.mark.usefixtures("causes_alone_throughout")
 
 SETTINGS = tuple(Setting(spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 12.0, 24.0))
 RIGS = {

@@ -13,7 +13,7 @@ from diagnosis.settings.origin import Origin
 from docs.studies import settings_page
 from identification.show.numbers import part
 from tests.support.diagnosis_document import findings_of
-from tests.support.gap_campaigns import campaign
+from tests.support.gap_campaigns import FOUR, campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
 FIELDS = {
@@ -154,8 +154,9 @@ def test_a_document_of_an_earlier_setting_is_refused_in_one_line(name):
     assert "tunnel diagnose --json" in caught.value.remedy
 
 
+@pytest.mark.usefixtures("causes_alone")
 def test_the_settings_given_decide_and_are_in_the_document():
-    data = campaign()
+    data = campaign(duration=5.0, conditions=FOUR)
     assert not investigate(data, ()).gap.test.detected
     everything = Settings().changed(
         {"gap.detection_rate": 1e3}
