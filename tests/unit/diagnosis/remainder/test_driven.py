@@ -61,6 +61,7 @@ def answer(rise: float, by_angle: float = 0.0, load: float = 0.0) -> Diagnosis:
     return diagnose(campaign(rise, by_angle, load), kinds=kinds, rivals=())
 
 
+@pytest.mark.slow
 def test_the_rise_of_friction_at_low_rates_is_a_form_of_dry_friction() -> None:
     found = answer(RISE)
     assert found.causes == ("coulomb_friction",)

@@ -22,7 +22,7 @@ from tests.support.diagnosis_document import document, findings_of
 from tests.support.gap_campaigns import CN_BETA, campaign, precise
 from tunnel_sim.effects import effect_class, effect_from
 
-pytestmark = pytest.mark.usefixtures("causes_alone")
+pytestmark = pytest.mark.usefixtures("causes_alone_throughout")
 
 NAME = "spring_miscalibration"
 KINDS = [effect_class(NAME), effect_class("coulomb_friction")]
@@ -31,7 +31,7 @@ KINDS = [effect_class(NAME), effect_class("coulomb_friction")]
 @pytest.fixture(scope="module")
 def study():
     off = effect_from(NAME, {"spring_stiffness": 44.84, "error": 0.02})
-    return investigate(precise(campaign(off)), KINDS)
+    return investigate(precise(campaign(off, duration=5.0)), KINDS)
 
 
 def test_both_springs_are_choices_of_equal_probability(study):

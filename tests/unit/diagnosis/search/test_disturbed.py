@@ -39,7 +39,7 @@ from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
 
-pytestmark = pytest.mark.usefixtures("causes_alone")
+pytestmark = pytest.mark.usefixtures("causes_alone_throughout", "with_odd_runs")
 
 CHOSEN = Settings().selection
 FEW = tuple(map(effect_class, ("coulomb_friction", "cubic_stiffness")))

@@ -313,7 +313,7 @@ def test_forms_are_tried_only_where_they_could_win_and_once(monkeypatch: pytest.
 @pytest.mark.parametrize(
     ("form", "freed"),
     [
-        ({"exponent": 0.3}, ("exponent",)),
+        slow({"exponent": 0.3}, ("exponent",)),
         slow({"saturation": 0.4}, ("saturation",)),
         slow({"peak": 1.0, "peak_rate": 0.4}, ("peak", "peak_rate")),
         ({"presliding": 0.02}, ("presliding",)),
@@ -355,7 +355,7 @@ def test_instants_are_sought_again_beside_a_form() -> None:
     """Beside friction without presliding, further instants follow the error of its frequency."""
     friction = effect_from("coulomb_friction", {"friction_moment": 0.003, "presliding": 0.008})
     lost = effect_from("dropped_samples", {"lost_time": 0.002})
-    base = nominal(campaign(friction, lost, duration=10.0))
+    base = nominal(campaign(friction, lost, duration=10.0, conditions=FOUR[::3]))
     found = grow(whole_runs(base, [type(friction), type(lost)]))[0]
     assert found.names == ("coulomb_friction", "dropped_samples")
     assert found.fit.problem.free_forms == ("coulomb_friction.presliding",)

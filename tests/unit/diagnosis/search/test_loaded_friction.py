@@ -242,7 +242,8 @@ def test_friction_under_the_load_of_an_actuator_is_tried_though_others_fit_bette
     assert ((LOAD,) in tried) == driven
 
 
-@pytest.mark.parametrize("driven", [slow(False), True])
+@pytest.mark.slow
+@pytest.mark.parametrize("driven", [False, True])
 def test_a_joint_that_carries_a_load_is_diagnosed_and_patched(tmp_path: Path, driven: bool) -> None:
     """The fit explains either, and MuJoCo's joint then moves as the records."""
     actuators = MOTOR if driven else ""
@@ -261,9 +262,8 @@ def test_a_joint_that_carries_a_load_is_diagnosed_and_patched(tmp_path: Path, dr
     assert answer.decision.decided
 
 
-@pytest.mark.parametrize(
-    ("driven", "seed"), [(False, 5), slow(True, 5), slow(False, 6), slow(True, 6), slow(True, 7)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("driven", "seed"), [(False, 5), (True, 5), (False, 6), (True, 6), (True, 7)])
 def test_load_and_presliding_act_together(tmp_path: Path, driven: bool, seed: int) -> None:
     """Both are named with their sizes; MuJoCo's joint then moves as the records."""
     xml = robot(TRUE, axis=LEVEL, actuators=MOTOR if driven else "", tip=0.2)

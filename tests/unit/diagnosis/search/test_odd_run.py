@@ -29,7 +29,7 @@ from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array, Record
 
-pytestmark = pytest.mark.usefixtures("causes_alone")
+pytestmark = pytest.mark.usefixtures("causes_alone_throughout", "with_odd_runs")
 
 FEW = tuple(map(effect_class, ("coulomb_friction", "cubic_stiffness", "buffeting")))
 

@@ -226,6 +226,7 @@ def test_buffeting_is_offered_where_it_blows(windy):
     assert left(answer).share < 0.1
 
 
+@pytest.mark.slow
 def test_turbulence_is_not_called_vortices_where_buffeting_is_excluded():
     """A narrow spectrum that follows the wind takes up turbulence too; the broad one explains it better."""
     base = nominal(buffeted(four_runs(), 0.002, 1.0))
@@ -235,6 +236,7 @@ def test_turbulence_is_not_called_vortices_where_buffeting_is_excluded():
     assert weigh_random_moments(whole_runs(base, BOTH[1:]), []) == []
 
 
+@pytest.mark.slow
 def test_weak_turbulence_is_seen_beside_a_spring_that_closes_all_but_a_hundredth_of_the_gap():
     strong = effect_from("cubic_stiffness", {"coefficient": -0.2})
     base = nominal(buffeted(campaign(strong, duration=10.0), 0.0012, 4.0))
@@ -291,6 +293,7 @@ def test_beside_turbulence_that_misleads_all_sets_they_are_grown_anew():
     assert abs(excess_elsewhere(found, moment_of(answer).process.runs)) < 0.1
 
 
+@pytest.mark.slow
 def test_an_effect_of_the_wind_that_is_weak_beside_turbulence_is_found():
     """It closes too little of the gap to be compared by shares, but far more than chance."""
     base = nominal(
@@ -482,6 +485,7 @@ def test_vortices_beside_a_slow_error_of_one_run_have_one_part(monkeypatch):
     assert "broad_band" in second_parts()
 
 
+@pytest.mark.slow
 def test_turbulence_of_another_spectrum_is_not_called_vortices_beside_turbulence():
     """An octave with sharp edges has two parts, both of them turbulence."""
     rng = np.random.default_rng(3)

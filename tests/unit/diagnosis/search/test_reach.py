@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
+import pytest
 from scipy.integrate import solve_ivp
 
 from diagnosis import vocabulary
@@ -14,10 +17,13 @@ from tunnel_sim.effects import known_effects
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
 
+pytestmark = pytest.mark.usefixtures("causes_alone_throughout")
+
 RATE, NOISE, INERTIA = 100.0, 3e-4, 0.1
 SPRINGS = (16.0, 16.0, 30.0, 30.0)
 
 
+@cache
 def campaign(*, friction: float = 0.0, strange: float = 0.0) -> Campaign:
     """Decays by SciPy's integrator.
 

@@ -12,9 +12,12 @@ from scipy.integrate import solve_ivp
 from diagnosis.model.fact import Fact
 from diagnosis.search.investigate import investigate
 from diagnosis.search.resolved import unresolved
+from tests.marks import slow
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
+
+pytestmark = pytest.mark.usefixtures("causes_alone_throughout")
 
 TIME = np.arange(2000) / 100.0
 
@@ -46,7 +49,7 @@ def study(name, *swings):
     ("name", "moment"),
     [
         ("cubic_stiffness", lambda angle, _: 10.0 * angle**3),
-        ("coulomb_friction", lambda _, rate: 0.05 * np.tanh(rate / 1e-3)),
+        slow("coulomb_friction", lambda _, rate: 0.05 * np.tanh(rate / 1e-3)),
     ],
 )
 def test_an_effect_that_acts_is_resolved_by_a_half(name, moment):

@@ -38,7 +38,7 @@ from tunnel_sim.vocabulary.campaign import (
 )
 from tunnel_sim.vocabulary.record import Record
 
-pytestmark = pytest.mark.usefixtures("causes_alone")
+pytestmark = pytest.mark.usefixtures("causes_alone_throughout", "with_odd_runs")
 
 INERTIA, DAMPING, NOISE, RATE = 0.1, 0.03, 3e-4, 100.0
 SPRINGS = (16.0, 16.0, 16.0, 30.0, 30.0, 44.0, 44.0, 44.0)
@@ -163,6 +163,7 @@ def test_an_effect_that_does_what_the_scatter_does_is_left_out() -> None:
     assert view.likeliest_part([beside]).effects == ("cubic_stiffness",)
 
 
+@pytest.mark.slow
 def test_two_patterns_in_one_number_are_not_chance() -> None:
     """Beside what a dependence on the speed leaves, a wrong spring looks like chance, and the reverse."""
     rng, time, runs = np.random.default_rng(8), np.arange(0.0, 6.0, 1.0 / RATE), []
@@ -195,6 +196,7 @@ def test_runs_that_repeat_show_none() -> None:
     assert found.repeats.spreads == ()
 
 
+@pytest.mark.slow
 def test_stated_scatter_is_no_gap_but_more_than_that_is() -> None:
     stated = Repeatability(spring_stiffness=SPRING, mechanical_damping=DAMPER)
     within = investigate(campaign(repeatability=stated), FEW)
@@ -251,7 +253,7 @@ def test_what_follows_the_order_of_the_runs_is_no_scatter() -> None:
 
 
 def test_a_difference_with_a_condition_beside_a_cause_leaves_the_answer_undecided() -> None:
-    found = diagnose(campaign(scatter=0.0, cubic=0.1, by_spring=0.2), kinds=FEW)
+    found = diagnose(campaign(scatter=0.0, cubic=0.1, by_spring=0.2), kinds=FEWER, rivals=())
     assert found.causes == ("cubic_stiffness", DAMPED)
     assert not found.decided
     assert [doubt.kind for doubt in found.decision.doubts] == ["pattern"]

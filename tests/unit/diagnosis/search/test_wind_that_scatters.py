@@ -25,6 +25,8 @@ from tunnel_sim.vocabulary.between_runs import Repeatability
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
 
+pytestmark = pytest.mark.usefixtures("causes_alone_throughout")
+
 INERTIA, DAMPING, NOISE, RATE, DENSITY = 0.1, 0.02, 3e-4, 100.0, 1.2
 CN_BETA, CN_R, STROUHAL = 0.45, -0.1, 0.06
 SPEEDS = (0.0, 0.0, 12.0, 16.0, 16.0, 20.0, 20.0, 24.0)

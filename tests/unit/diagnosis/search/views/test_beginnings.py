@@ -22,7 +22,7 @@ from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Record
 
-pytestmark = pytest.mark.usefixtures("causes_alone")
+pytestmark = pytest.mark.usefixtures("causes_alone_throughout")
 
 SPRING = Planted(cubic=-2.0)
 VIEWS = Beginnings, AfterBeginnings, WholeRuns
@@ -95,6 +95,7 @@ def test_what_acts_later_on_is_found_in_whole_runs(share: float) -> None:
     assert lost == pytest.approx(LOST, rel=0.02)
 
 
+@pytest.mark.slow
 def test_what_acts_later_on_is_found_beside_what_acts_from_the_beginning() -> None:
     """Both runs lose five samples after five eighths of their length."""
     lost, runs = slice(5 * COUNT // 8, 5 * COUNT // 8 + 5), []

@@ -17,6 +17,8 @@ from tunnel_sim.engine.virtual_campaign import simulate_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.plan import CampaignPlan, Condition, EffectSetting, SensorModel, Truth
 
+pytestmark = pytest.mark.usefixtures("causes_alone_throughout")
+
 SPRING, FRICTION = "cubic_stiffness", "coulomb_friction"
 STREAM, SURROUNDINGS = "buffeting", "ambient_vibration"
 KINDS = tuple(map(effect_class, (SPRING, FRICTION, STREAM, SURROUNDINGS)))

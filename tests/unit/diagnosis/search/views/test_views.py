@@ -2,12 +2,16 @@
 
 from dataclasses import dataclass, replace
 
+import pytest
+
 from diagnosis.likelihood.least_squares import fit, try_fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.search.investigate import investigate
 from diagnosis.search.views.view import View
 from tests.support.gap_campaigns import campaign
 from tunnel_sim.effects import effect_class, effect_from
+
+pytestmark = pytest.mark.usefixtures("causes_alone_throughout")
 
 NAMES = ("quadratic_damping", "coulomb_friction", "cubic_stiffness")
 
