@@ -17,6 +17,8 @@ from tests.support.driven_runs import GAIN, driven
 from tests.support.gap_campaigns import nominal
 from tunnel_sim.vocabulary.record import Record
 
+pytestmark = pytest.mark.usefixtures("causes_alone_throughout")
+
 NOISE = 4e-4
 STIFFNESSES = (16.12, 21.02)
 

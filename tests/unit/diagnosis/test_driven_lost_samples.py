@@ -22,6 +22,8 @@ from tunnel_sim.vocabulary.inputs import Hold, Input
 from tunnel_sim.vocabulary.plan import AeroDerivatives, SensorModel
 from tunnel_sim.vocabulary.record import Array, Record
 
+pytestmark = pytest.mark.usefixtures("causes_alone_throughout")
+
 RATE, INERTIA, DAMPING, NOISE = 200.0, 0.1, 0.05, 3e-4
 SPRINGS, LOST, SHARES = (16.0, 30.0), 0.02, (0.4, 0.62)
 A = 0.5 * DAMPING / INERTIA

@@ -13,6 +13,8 @@ from tunnel_sim.vocabulary.input_kinds import InputColumn
 from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.record import Array, Record
 
+pytestmark = pytest.mark.usefixtures("causes_alone_throughout")
+
 RATE, INERTIA, DAMPING, NOISE = 200.0, 0.1, 0.02, 3e-4
 COMPLIANCE, SHARE = 2e-3, 0.2
 TIME = np.arange(2000) / RATE

@@ -7,7 +7,7 @@ from tests.marks import slow
 from tests.support.gap_campaigns import CN_BETA, campaign
 from tunnel_sim.effects import ALL_EFFECTS, effect_from
 
-pytestmark = pytest.mark.usefixtures("causes_alone")
+pytestmark = pytest.mark.usefixtures("causes_alone_throughout")
 
 FEW = vocabulary(["coulomb_friction", "quadratic_damping", "cubic_stiffness", "structural_damping"])
 

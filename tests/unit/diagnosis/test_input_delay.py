@@ -23,12 +23,12 @@ from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.plan import EffectSetting
 from tunnel_sim.vocabulary.record import Record
 
-pytestmark = pytest.mark.usefixtures("causes_alone")
+pytestmark = pytest.mark.usefixtures("causes_alone_throughout")
 
 RATE, INERTIA, DAMPING, SPRING, NOISE = 500.0, 0.1, 0.05, 16.0, 3e-4
 TIME = np.arange(6000) / RATE
 DELAY = InputDelay
-FEW = vocabulary([DELAY.name, "quadratic_damping", "cubic_stiffness", "rod_flexibility", "sensor_drift"])
+FEW = vocabulary([DELAY.name, "quadratic_damping", "cubic_stiffness"])
 
 
 @cache

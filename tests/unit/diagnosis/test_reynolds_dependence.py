@@ -45,6 +45,7 @@ def test_three_speeds_name_it_with_its_size_and_with_cn_beta_at_the_mean_speed()
     assert abs(after.value - TRUTH.cn_beta) < 4.0 * after.std
 
 
+@pytest.mark.slow
 def test_three_speeds_tell_it_from_an_offset_of_the_speed():
     data = simulate_campaign(plan((0.0, 12.0, 18.0, 25.0), "wind_speed_offset", offset=0.3))
     assert investigate(data, KINDS, rivals=()).causes == ("wind_speed_offset",)

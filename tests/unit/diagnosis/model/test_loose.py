@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis import diagnose
+from diagnosis import diagnose, vocabulary
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import nominal_start
@@ -21,10 +21,11 @@ from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorP
 from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.record import Record
 
-pytestmark = pytest.mark.usefixtures("causes_alone")
+pytestmark = pytest.mark.usefixtures("causes_alone_throughout")
 
 RATE, STEPS, INERTIA, DAMPING, OFFSET, FRICTION, NOISE = 100.0, 5, 2.0, 3.0, 0.4, 1.0, 3e-3
 TIME = np.arange(2000) / RATE
+FEW = vocabulary(["coulomb_friction", "quadratic_damping", "cubic_stiffness", "sensor_drift"])
 
 
 def moment(seed: int) -> np.ndarray:
@@ -89,7 +90,7 @@ def within(found: Diagnosis, stds: float) -> bool:
 
 
 def test_dry_friction_is_named_and_what_vanishes_without_a_spring_is_said() -> None:
-    found = diagnose(campaign(joint(FRICTION, 2)), rivals=())
+    found = diagnose(campaign(joint(FRICTION, 2)), kinds=FEW, rivals=())
     assert found.causes == ("coulomb_friction",)
     friction = found.candidates[0].parameters["friction_moment"]
     assert friction.std is not None

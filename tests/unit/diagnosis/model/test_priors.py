@@ -20,7 +20,7 @@ from diagnosis.model.run_noise import WhiteNoise
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
 
-pytestmark = pytest.mark.usefixtures("causes_alone")
+pytestmark = pytest.mark.usefixtures("causes_alone_throughout")
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

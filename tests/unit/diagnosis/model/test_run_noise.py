@@ -115,6 +115,7 @@ def test_the_response_to_a_random_moment_is_made_white_from_the_start_of_a_run()
     assert run_with(noise, moved).scaled(moved) == pytest.approx(white, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_estimates_in_noise_of_ones_own_kind_scatter_as_stated():
     """Noise twice as strong in the second half of every run; truth: the parameters of the readings without it."""
     problem, rng, trials = nominal(campaign(duration=5.0)).problem, np.random.default_rng(4), 40

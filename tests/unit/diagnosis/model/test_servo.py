@@ -22,7 +22,7 @@ from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.inputs import Input
 
-pytestmark = pytest.mark.usefixtures("models_in_this_process")
+pytestmark = pytest.mark.usefixtures("models_in_this_process", "causes_alone_throughout")
 
 KP, KV, DAMPING = 60.0, 4.0, 0.4
 KINDS = vocabulary(robots.KINDS)

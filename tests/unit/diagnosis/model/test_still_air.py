@@ -11,7 +11,7 @@ from diagnosis.model.still_air import StillAir
 from tests.support.gap_campaigns import DAMPING, INERTIA, campaign
 from tunnel_sim.effects import effect_from
 
-pytestmark = pytest.mark.usefixtures("causes_alone")
+pytestmark = pytest.mark.usefixtures("causes_alone_throughout")
 
 CONDITIONS = [(16.12, 0.0), (16.12, 0.0), (44.84, 0.0), (44.84, 0.0), (16.12, 20.0)]
 FRICTION = effect_from("coulomb_friction", {"friction_moment": 0.004})
