@@ -16,6 +16,8 @@ from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
 
+pytestmark = pytest.mark.usefixtures("causes_alone_throughout")
+
 
 @pytest.fixture(scope="module")
 def spoilt() -> tuple[Campaign, Campaign]:

@@ -25,6 +25,8 @@ from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.plan import CampaignPlan, EffectSetting
 from tunnel_sim.vocabulary.record import Array, Record
 
+pytestmark = pytest.mark.usefixtures("causes_alone_throughout")
+
 RATE, INERTIA, DAMPING, NOISE = 500.0, 0.1014, 0.018, 3e-4
 SPRINGS = (16.12, 44.84)
 TIME = np.arange(6000) / RATE  # 500 Hz: at 200 Hz an input that is linear between samples is 0.2 % too small

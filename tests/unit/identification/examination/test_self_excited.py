@@ -20,6 +20,8 @@ from tests.support.decays import RATE, campaign, reading, run
 from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.record import Array
 
+pytestmark = pytest.mark.usefixtures("causes_alone_throughout")
+
 GROWTH, SETTLED, OMEGA = 0.4, 0.3, 20.0
 
 
@@ -60,7 +62,7 @@ def test_four_windows_of_linear_growth_are_enough() -> None:
     assert sum(np.array(remark.figures["amplitude_rad"]) < 0.3 * SETTLED) == 4
 
 
-@pytest.mark.parametrize("start", [0.1, 0.2])
+@pytest.mark.parametrize("start", [slow(0.1), 0.2])
 def test_a_record_that_begins_late_is_known_by_an_amplitude_that_stays(start: float) -> None:
     """Most of the record is the limit cycle, so that its last quarter is hardly larger than its first one."""
     (remark,) = examine(campaign([excited(start, 60.0)])).remarks

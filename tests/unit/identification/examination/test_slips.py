@@ -26,7 +26,8 @@ OF_ANOTHER_SIZE = {
     "two speeds exchanged", "one density's decimal point", "a second day's density 15 % too high",
     "the first day's density 15 % too low", "idle wind of 6 m/s", "two springs one number down",
     "one speed 10 % high", "density falls along the campaign", "one clock 10 % slow",
-    "one clock 4 % fast with the wind on",
+    "one clock 4 % fast with the wind on", "one setting in km/h", "one 15 stated as 20", "one speed 10 % low",
+    "one speed in ft/s", "one speed of the stiff spring in km/h",
 }  # fmt: skip
 """Slips that another one has the kind of."""
 CASES = [

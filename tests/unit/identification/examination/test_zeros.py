@@ -23,6 +23,8 @@ from tunnel_sim.engine.virtual_campaign import simulate_campaign
 from tunnel_sim.vocabulary.plan import CampaignPlan, Condition, EffectSetting, SensorModel, Truth
 from tunnel_sim.vocabulary.record import Record
 
+pytestmark = pytest.mark.usefixtures("causes_alone_throughout")
+
 REPEATS = tuple((f"{letter}-v{speed:g}", speed) for letter in "abc" for speed in (0.0, 25.0))
 
 

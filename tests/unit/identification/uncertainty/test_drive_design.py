@@ -137,7 +137,7 @@ def test_without_sensor_noise_the_bound_is_that_of_a_regression(free: PlanDocume
 
 def test_the_density_is_that_of_the_drawn_moment() -> None:
     # its integral over all frequencies (Hz, both signs) is the variance
-    rates = 2.0 * np.pi * np.linspace(-4000.0, 4000.0, 400_001)
+    rates = 2.0 * np.pi * np.linspace(-4000.0, 4000.0, 40_001)
     for effect, pressure, std in (
         (effect_class("buffeting")(intensity=0.02, bandwidth=8.0), 5.0, 0.1),
         (effect_class("buffeting")(intensity=0.02, bandwidth=8.0), 0.0, 0.0),  # with the wind off
