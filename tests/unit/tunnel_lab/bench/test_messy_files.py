@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import scipy.io
 
+from tests.marks import slow
 from tests.support.browser import IN_A_BROWSER, screenshot
 from tests.support.import_files import decay
 from tests.support.served import Bench, Tab, tab
@@ -52,6 +53,7 @@ def visible_fields(one: Tab) -> list[str]:
     return [label for label in found if not label.startswith(("Name of", "Unit of pot", "Unit of t"))]
 
 
+@pytest.mark.slow
 def test_volts_ask_for_a_calibration_and_for_nothing_else(
     browser: Any, served: Bench, tmp_path: Path
 ) -> None:
@@ -97,7 +99,7 @@ def test_a_clipped_run_comes_first_until_its_release_is_moved(
         assert page.locator("figure.chart figcaption").all_inner_texts() == ["day4_b", "day4_a"]
 
 
-@pytest.mark.parametrize("by", ["mouse", "keyboard"])
+@pytest.mark.parametrize("by", [slow("mouse"), "keyboard"])
 def test_a_release_is_added_moved_and_removed(browser: Any, served: Bench, tmp_path: Path, by: str) -> None:
     time, angle = decay(duration=16.0)
     name = f"by{by}"

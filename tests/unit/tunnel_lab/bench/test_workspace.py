@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tunnel_lab.bench.workspace import new_session, open_session, safe_name, sessions
@@ -34,6 +34,7 @@ def test_a_hostile_name_becomes_a_plain_one(given: str, safe: str) -> None:
     assert safe_name(given) == safe
 
 
+@settings(max_examples=40)
 @given(st.text(max_size=300))
 def test_a_safe_name_is_a_file_of_its_folder_and_stays(text: str) -> None:
     name = safe_name(text)

@@ -112,8 +112,9 @@ OVER = """() => {
 }"""
 
 
-@pytest.mark.parametrize("opened", WIDTHS, indirect=True)
-@pytest.mark.parametrize("media", ["screen", "print"])
+@pytest.mark.parametrize(
+    ("opened", "media"), [(WIDTHS[0], "screen"), (WIDTHS[1], "print")], indirect=["opened"]
+)
 def test_long_coefficients_stay_beside_the_waterfall(opened: Opened, media: Any) -> None:
     opened.page.evaluate(LONG)
     opened.page.emulate_media(media=media)
@@ -407,7 +408,7 @@ def changed(change: Callable[[Any], None]) -> str:
     return render_report(findings_of(given), campaign())
 
 
-KINDS = [lambda _: None, crowded, slow(unknown), slow(undecided)]
+KINDS = [slow(lambda _: None), crowded, slow(unknown), slow(undecided)]
 FIRST_PAGE = """() => {
   const [first, second] = document.querySelectorAll(".sheet");
   return [first.innerText, second.innerText, getComputedStyle(second).breakBefore];
