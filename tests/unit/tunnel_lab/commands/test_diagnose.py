@@ -142,7 +142,7 @@ def test_runs_without_a_stiffness_are_said_to_share_a_spring(
 
 
 def test_noise_far_above_the_stated_is_said(tunnel: Tunnel, tmp_path: Path) -> None:
-    settings = [Setting(16.12, 0.0), Setting(44.84, 0.0), Setting(16.12, 15.0), Setting(44.84, 15.0)]
+    settings = [Setting(16.12, 0.0), Setting(16.12, 15.0)]
     rng = np.random.default_rng(4)
     data = campaign(settings, duration=5.0, rate=500.0, noise=0.01, stated_noise=0.0005, rng=rng)
     status, out, _ = tunnel("diagnose", write_campaign(data, tmp_path / "noisy"), "--effects", "sensor_drift")

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from tests.marks import slow
 from tests.support.linear import FORBIDDEN, linear_campaign
 from tests.unit.tunnel_lab.conftest import Tunnel
 
@@ -77,10 +76,11 @@ def test_import_identify_diagnose_report(tunnel: Tunnel, files: dict[Path, float
         assert not re.search(FORBIDDEN, text), re.findall(rf".{{0,40}}(?:{FORBIDDEN}).{{0,40}}", text)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("causes_alone")
 @pytest.mark.parametrize(
     ("heading", "per_newton"),
-    [("force (N)", 1.0), slow("base acceleration (g)", -1.0 / (MASS * 9.80665))],
+    [("force (N)", 1.0), ("base acceleration (g)", -1.0 / (MASS * 9.80665))],
 )
 def test_a_pushed_and_a_shaken_cart_from_file_to_report(
     tunnel: Tunnel, tmp_path: Path, heading: str, per_newton: float

@@ -101,6 +101,7 @@ def test_a_blind_set_is_answered_and_scored_with_them(
     assert tunnel("blind", "diagnose", tmp_path / "set", "--exclude", "detent")[0] == 2
 
 
+@pytest.mark.slow
 def test_a_check_states_every_law_and_fails_where_one_is_violated(
     tunnel: Tunnel, effects_file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -33,7 +34,15 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_campaign(hostile(), tmp_path_factory.mktemp("names") / r"[c] $\bar$")
 
 
-def test_plot(tunnel: Tunnel, folder: Path, tmp_path: Path) -> None:
+def test_plot(tunnel: Tunnel, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every text is laid out, as a formula of it would be, and nothing painted."""
+    from matplotlib.figure import Figure
+
+    def laid_out(figure: Figure, stream: Any, **_: Any) -> None:
+        figure.draw_without_rendering()
+        stream.write(b"\x89PNG\r\n\x1a\n")
+
+    monkeypatch.setattr(Figure, "savefig", laid_out)
     status, out, err = tunnel("plot", folder, "--out", tmp_path / "figures")
     assert (status, err) == (0, "")
     assert r"[c] $\bar$/windows.png" in out

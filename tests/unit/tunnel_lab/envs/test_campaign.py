@@ -40,7 +40,7 @@ def equal(first, second):
 
 @pytest.mark.parametrize(
     "arguments",
-    [SHORT, slow({**SHORT, "simulation": "full"}), QUICK_DIAGNOSIS],
+    [SHORT, slow({**SHORT, "simulation": "full"}), slow(QUICK_DIAGNOSIS)],
     ids=["identification", "full", "diagnosis"],
 )
 def test_the_public_checkers_pass(arguments, recwarn):

@@ -121,7 +121,7 @@ def test_nothing_overlaps_or_is_cut_off(count: int) -> None:
     """One decay cell, one campaign cell and one whose effects have long names; warnings are errors."""
     decay = Cell("decay", 0.005, 3.0, 0.35, 200.0, 0.0, zeta=0.01, frequency=3.0)
     plain = Cell("campaign", 0.002, 4.0, 0.35, 200.0, 0.0, wind_speed=20.0, springs=(16.12, 44.84))
-    cells = [decay, plain, replace(plain, effect=LONG), replace(plain, effect=FRICTION)]
+    cells = [decay, plain, replace(plain, effect=LONG)]
     every = (*decay.quantities, *plain.quantities)
     fig = score_figure(made(cells, {f"method_{number}": every for number in range(count)}))
     boxes, whole = texts_of(fig), fig.bbox
