@@ -59,6 +59,7 @@ def test_the_curves_are_drawn() -> None:
     assert (DOCS / "images" / "train-an-agent-curves.png").read_bytes()[:4] == b"\x89PNG"
 
 
+@pytest.mark.slow
 def test_the_first_example_prints_what_is_shown(tmp_path: Path) -> None:
     """And an agent read from a file, here the stored one, chooses the same runs."""
     first, reading, *_ = quotes(PAGE.read_text("utf-8"))

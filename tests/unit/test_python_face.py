@@ -35,7 +35,10 @@ def estimate(data: Campaign) -> Estimate:
 
 
 @pytest.fixture(scope="module")
-def found(data: Campaign, tmp_path_factory: pytest.TempPathFactory) -> Diagnosis:
+def found(
+    data: Campaign, tmp_path_factory: pytest.TempPathFactory, causes_alone_throughout: None
+) -> Diagnosis:
+    del causes_alone_throughout
     folder = tmp_path_factory.mktemp("face") / "small"
     write_campaign(data, folder)
     return diagnose(str(folder), kinds=vocabulary(["quadratic_damping", "coulomb_friction"]))

@@ -137,7 +137,8 @@ class Wake(Periodic):
                 runs["shedding_phase"][place] = effect.drawn_number(own)
 
 
-@pytest.mark.usefixtures("causes_alone")
+@pytest.mark.slow
+@pytest.mark.usefixtures("causes_alone_throughout")
 def test_a_line_of_ones_own_is_found_with_a_phase_in_every_run() -> None:
     built_in = [effect_class(name) for name in ("coulomb_friction", "quadratic_damping", "second_mode")]
     found = diagnose(campaign(Wake(0.5, 0.23)), kinds=[*built_in, Wake], rivals=())
@@ -219,8 +220,9 @@ def test_a_similar_rig_moves_through_the_same_angles(change: Similarity) -> None
 
 
 @pytest.fixture(scope="module")
-def hardened() -> dict[str, Diagnosis]:
+def hardened(causes_alone_throughout: None) -> dict[str, Diagnosis]:
     """The same campaign diagnosed with the built-in effect, a class and an expression."""
+    del causes_alone_throughout
     data = campaign(effect_from("cubic_stiffness", {"coefficient": 0.3}), duration=6.0)
     data = dataclasses.replace(data, runs=data.runs[::2])
     others = tuple(effect_class(name) for name in ("coulomb_friction", "sensor_drift"))

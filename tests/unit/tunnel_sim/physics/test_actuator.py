@@ -36,7 +36,7 @@ from tunnel_sim.vocabulary.inputs import Input
 from tunnel_sim.vocabulary.plan import EffectSetting
 from tunnel_sim.vocabulary.record import Record
 
-pytestmark = pytest.mark.usefixtures("causes_alone")
+pytestmark = pytest.mark.usefixtures("causes_alone_throughout")
 
 STEP = 0.01
 TIME = STEP * np.arange(40)
@@ -318,6 +318,7 @@ def test_each_is_named_with_its_value(name: str, value: float) -> None:
     assert found.gap.closed > 0.99
 
 
+@pytest.mark.slow
 def test_a_limit_approached_as_a_hyperbolic_tangent_is_a_saturation_alone() -> None:
     found = diagnose(through(limit=0.8, soft=True), kinds=KINDS, rivals=())
     assert found.causes == ("actuator_saturation",)

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.marks import slow
 from tests.support.import_files import written
 from tests.support.logs import Log
 from tunnel_lab.plotting.runs import import_picture
@@ -186,7 +187,7 @@ def random_motion(rng: np.random.Generator, zeta: float, size: int) -> Array:
     return motion / motion.std()
 
 
-@pytest.mark.parametrize("zeta", [0.01, 0.05])
+@pytest.mark.parametrize("zeta", [slow(0.01), 0.05])
 def test_random_motion_is_one_record_and_no_run_begins_in_it(zeta: float) -> None:
     """A pause and a growth by chance are rare, but possible: one of 24 records may be cut."""
     cut = 0
