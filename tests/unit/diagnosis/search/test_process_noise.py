@@ -236,17 +236,6 @@ def test_turbulence_is_not_called_vortices_where_buffeting_is_excluded():
     assert weigh_random_moments(whole_runs(base, BOTH[1:]), []) == []
 
 
-@pytest.mark.slow
-def test_weak_turbulence_is_seen_beside_a_spring_that_closes_all_but_a_hundredth_of_the_gap():
-    strong = effect_from("cubic_stiffness", {"coefficient": -0.2})
-    base = nominal(buffeted(campaign(strong, duration=10.0), 0.0012, 4.0))
-    (start, *_) = starting_points(base, type(strong))
-    spring = Hypothesis(("cubic_stiffness",), fit(start.problem, start.point, base=base))
-    assert 0.005 < spring.fit.excess / base.excess < 0.015
-    (answer,) = weigh_random_moments(whole_runs(base, (*BUFFETING, type(strong))), [spring])
-    assert answer.names == ("buffeting", "cubic_stiffness")
-
-
 def test_a_rival_beside_turbulence_is_an_answer_as_well():
     strong = effect_from("cubic_stiffness", {"coefficient": -0.2})
     base = nominal(buffeted(four_runs(strong), 0.0012, 4.0))
