@@ -16,7 +16,7 @@ from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import investigate
 from diagnosis.search.rivals.inertia_by_spring import InertiaBySpring
 from diagnosis.search.rivals.rival import Rival
-from diagnosis.search.rivals.two_springs import AnotherSpring, TwoSprings
+from diagnosis.search.rivals.two_springs import AnotherSpring, SpringError, TwoSprings
 from diagnosis.search.weigh import weigh
 from diagnosis.search.weights import FittedSet
 from diagnosis.settings import Settings
@@ -34,6 +34,11 @@ KINDS = [effect_class(name) for name in ("gravity_stiffness", "rod_flexibility",
 def two_off():
     """Three springs, two of them not as stiff as stated, in closed form."""
     return decays(dict.fromkeys(ERRORS, 0.0), ERRORS)
+
+
+@pytest.mark.parametrize(("error", "side"), [(0.0196, "stiffer"), (-0.0196, "softer")])
+def test_a_spring_that_is_off_is_said_with_its_side(error, side):
+    assert SpringError(16.12, error, 0.001).words == f"16.12 N m/rad is 1.96 ± 0.10 % {side} than stated"
 
 
 def test_two_springs_off_are_unknown_and_said_in_words(two_off):
