@@ -375,7 +375,8 @@ def _predictions(
     """The success of the answer's predictions."""
     closes, repeats = answered.closes, answered.repeats
     gap, patterns = closes.gap, () if repeats is None else repeats.trends
-    spreads = () if repeats is None else repeats.spreads
+    followed = {one.effect for one in patterns}  # what follows a pattern is not said to be scatter
+    spreads = () if repeats is None else (one for one in repeats.spreads if one.effect not in followed)
     return Predictions(
         held_out=gap.closed,
         ahead=gap.closed_ahead,

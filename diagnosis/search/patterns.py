@@ -40,7 +40,7 @@ Estimated. The distance is bounded by the widths without the pattern. Of 71 patt
 campaigns, none needs more than 3."""
 
 _ORDER, _GROUPS = "order", "groups"
-_NO_BOUND = 1e-3  # share of the runs' differences outside a pattern that counts as none
+_LEAST_OUTSIDE = 1e-3  # variances outside a pattern that may be all of the difference
 _OF_LINE = 2  # number of parameters of a straight line
 
 
@@ -218,10 +218,10 @@ def _trend(fitted: Fit, place: int, pattern: Pattern, tried: int) -> Trend | Non
         return None
     columns, size = fitted.columns.with_pattern(place, pattern.values)
     freedom, patterns = count - _OF_LINE, tried * pattern.tried
-    # most patterns are chance, and the widths without the pattern bound its clarity at a tenth of the cost
-    least_clear = _distance(marginal(columns.products, fitted.columns.likeliest().widths))
-    clearest = freedom * least_clear / max(freedom + 1.0 - least_clear, _NO_BOUND)
-    if _by_chance(SCREENED * clearest, freedom, patterns) >= chosen.trend_rate:
+    # most patterns are chance; the widths without the pattern bound its distance at a tenth of the cost of a fit
+    distance = _distance(marginal(columns.products, fitted.columns.likeliest().widths))
+    bound = freedom * distance / max(freedom + 1.0 - distance, _LEAST_OUTSIDE)
+    if _by_chance(SCREENED * bound, freedom, patterns) >= chosen.trend_rate:
         return None
     if columns.share_apart() < APART:
         return None
