@@ -333,7 +333,7 @@ def unit_of_frequency(name: str, unit: str) -> str:
 """Quantities in rad/s that are no rate of the body."""
 _SENTENCES = (
     "what", "remedy", "verdict", "cautions", "note", "words", "reason", "notes", "blind_spots", "further", "label",
-    "motion_words",
+    "motion_words", "gain",
 )  # fmt: skip
 """Fields of documents that hold sentences."""
 _KEPT = ("figures", "provenance", "seconds", "data", "engine")

@@ -127,12 +127,15 @@ class _Document:
     rate: _Value
     note: str
     name: str
+    gain: str = ""
 
 
 def test_a_document_has_own_units_and_the_same_numbers() -> None:
-    given = _Document(_Value(2.0, "rad/s"), _Value(3.0, "rad/s"), "an angle", "an angle")
+    given = _Document(_Value(2.0, "rad/s"), _Value(3.0, "rad/s"), "an angle", "an angle", "tells an angle")
     own = DISPLACEMENT.document(given)
-    assert own == _Document(_Value(2.0, "1/s"), _Value(3.0, "m/s"), "a displacement", "an angle")
+    assert own == _Document(
+        _Value(2.0, "1/s"), _Value(3.0, "m/s"), "a displacement", "an angle", "tells a displacement"
+    )
     assert ANGLE.document(given) is given
 
 
