@@ -199,7 +199,8 @@ class SecondReading:
         instead: the other reading in a few words, such as ``wrong hold``.
         words: the sentences on it.
         step: how to tell the two apart.
-        figures: the quantities in the sentences, by name, in JSON's types; the names contain their units.
+        figures: the quantities in the sentences, by name, in JSON's types: times in s, a stiffness as the campaign
+            states it, its error and deviation as fractions.
     """
 
     cause: str

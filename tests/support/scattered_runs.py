@@ -16,7 +16,7 @@ SCATTERED = ("wind_speed_scatter", "stiffness_scatter", "damping_scatter")
 
 
 def scattered(seed: int = 5, stiffness_scatter: float = 5e-4) -> Campaign:
-    """Twelve runs in closed form, with scatter of 0.3 % in speed and 1 % in damping."""
+    """Twelve runs in closed form, with scatter of 0.3 % in speed, 1 % in damping, and a given one in stiffness."""
     rng, time, runs = np.random.default_rng(seed), np.arange(0.0, 7.0, 0.01), []
     base = campaign(duration=0.1)
     for number in range(12):
